@@ -6,7 +6,7 @@ python docs/make_krl_truth.py
 from collections import Counter
 from pathlib import Path
 
-from gcode2krl.krl.constructs import Construct, constructs, sources
+from gcode2krl.krl.constructs import Construct, all_constructs, sources
 
 PAGE = Path(__file__).with_name("krl_truth.md")
 _HEAD = """# The truth about each KRL construct
@@ -47,12 +47,12 @@ splitting into files does not help there, as all lie in R1 at once.
 
 def page() -> str:
     """Return the page."""
-    counts = Counter(each.sure for each in constructs())
+    counts = Counter(each.sure for each in all_constructs())
     counted = ", ".join(f"{counts[sure]} {sure}" for sure in ("right", "probable", "assumed"))
     named = "".join(f"- *{short}*: {text}\n" for short, text in sources().items())
-    table = "".join(_row(each) for each in constructs())
+    table = "".join(_row(each) for each in all_constructs())
     head = "| construct | what we rely on | source | sure | from |\n| --- | --- | --- | --- | --- |\n"
-    rows = f"{len(constructs())} constructs: {counted}.\n\n{head}{table}"
+    rows = f"{len(all_constructs())} constructs: {counted}.\n\n{head}{table}"
     return f"{_HEAD}{rows}\n{_VERSIONS}## Sources\n\n{named}"
 
 

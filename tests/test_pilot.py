@@ -225,7 +225,7 @@ def test_forces_are_turned_into_the_tool():
 
 def test_tcp_is_the_tool_as_the_controller_has_it():
     """With x from tip to holder, a force along the inner z is one along x."""
-    frame = {"x_mm": 1.0, "y_mm": 0.0, "z_mm": 2.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
+    frame = {"x_mm": 100.0, "y_mm": 0.0, "z_mm": 200.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
     cell = resolve_cell({"based_on": "demonstration", "tool": {"2": {"axis": "+x", "frame": frame}}})
     rotation = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
     found = to_pilot_frame(np.array([[0, 0, 9.0], [0, 0, 9.0]]), rotation, np.array([1, 2]), cell)

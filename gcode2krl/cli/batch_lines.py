@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gcode2krl.batch.verdicts import VERDICTS
-from gcode2krl.batch.written.part import parts_of
-from gcode2krl.batch.written.words import demonstration
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.standard_files import tell
 from gcode2krl.errors import Issue, told
@@ -125,6 +123,10 @@ def table_lines(batch: Told, out: Path, seconds: float, stopped: bool) -> Iterat
     yield f"{'cached':<14}{counts['cached']:>7,}"
     yield f"{'time':<14}{seconds:>7.1f} s, {computed_s:.1f} s of workers"
     yield f"{out / 'index.html'} shows all of them"
+    # These import the report's page, which --help must not wait for.
+    from gcode2krl.batch.written.part import parts_of
+    from gcode2krl.batch.written.words import demonstration
+
     if warning := demonstration(parts_of(batch.records)):
         yield click.style(warning, fg="yellow")
 

@@ -24,7 +24,7 @@ _COMMANDS = {
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
     "batch": "Translate many parts: folders, patterns, files, @lists, or a TOML file with a cell a folder.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
-    "verify": "Read a KRL program back and compare it with its G-code.",
+    "verify": "Read a KRL program back, compare it with its G-code, and judge its hazards anew.",
     "report": "Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.",
     "diagnose": "Say where measured runs differ from their prediction, which effects explain it, "
     "and how far it shrinks.",

@@ -38,7 +38,7 @@ _RELEASED = re.compile(r"([a-z0-9-]+(?::(?:[^:]+:)?[0-9]{1,9})?)(?: \(whole file
 _REMEDY = "look at what it would do with the cell as it is, and translate again"
 
 
-def cell_hashes(cell: Cell, tools: Iterable[int]) -> dict[str, str]:
+def hashes_of_sections(cell: Cell, tools: Iterable[int]) -> dict[str, str]:
     """Return section → hash of what a program with these tools, or a check of it, may depend on."""
     used = {f"tool.{number}" for number in tools}
     counted = {
@@ -56,7 +56,7 @@ def hash_lines(
     has = {"pilot": pilot, "online": online}
     entries = [
         f"{section} {digits}"
-        for section, digits in cell_hashes(cell, tools).items()
+        for section, digits in hashes_of_sections(cell, tools).items()
         if has.get(section, True)
     ]
     entries.append(f"{_OPTIONS} {_options_hash(options, released)}")
@@ -108,7 +108,7 @@ class StatedCell:
             sentence = "the lines of options, released findings and cell hashes are not as they were written"
             yield Issue("error", "verify-header", self.line, sentence)
         listed = (section.split(".")[1] for section in self.hashes if section.startswith("tool."))
-        now = cell_hashes(cell, {*tools, *(int(number) for number in listed if number.isdecimal())})
+        now = hashes_of_sections(cell, {*tools, *(int(number) for number in listed if number.isdecimal())})
         for section in sorted((self.hashes.keys() | now.keys()) - {_OPTIONS}):
             before, after = self.hashes.get(section), now.get(section)
             if before == after or (before is None and section in _WITH_PILOT_OR_RSI):

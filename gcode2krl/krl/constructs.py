@@ -30,7 +30,7 @@ class Construct:
 
 
 @cache
-def constructs() -> tuple[Construct, ...]:
+def all_constructs() -> tuple[Construct, ...]:
     """Return the table."""
     rows = _table()["construct"]
     return tuple(Construct(**{**row, "source": tuple(row["source"])}) for row in rows)
@@ -45,7 +45,7 @@ def sources() -> Mapping[str, str]:
 def assumed_in(texts: Iterable[str]) -> list[str]:
     """Return what to look at in T1, of the constructs in files that nothing public confirms."""
     known = [text.replace("\r", "") for text in texts]
-    assumed = (each for each in constructs() if each.sure == "assumed")
+    assumed = (each for each in all_constructs() if each.sure == "assumed")
     return [each.look for each in assumed if any(each.form.search(text) for text in known)]
 
 

@@ -639,7 +639,8 @@ class _Checker:
     def check_for(self, statement: Statement) -> None:
         name = statement.values[0]
         variable = self.variable(name)
-        if variable is None or variable.type != "INT":
+        is_global = variable is None and self.program.has_globals and not name.startswith(("$", "GK_"))
+        if not is_global and (variable is None or variable.type != "INT"):
             self.refuse(f"{name} of FOR is no declared INT")
         for value in statement.values[1:]:
             if value is not None:

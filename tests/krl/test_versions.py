@@ -11,7 +11,7 @@ import pytest
 from docs import make_krl_truth
 from gcode2krl import load_cell, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, RefusedError
-from gcode2krl.krl.constructs import assumed_in, constructs, sources
+from gcode2krl.krl.constructs import all_constructs, assumed_in, sources
 from gcode2krl.krl.versions import ASSUMED
 from tests.cells import over_demonstration
 from tests.conftest import ROOT
@@ -95,7 +95,7 @@ def beyond_the_table(text):
     left = []
     for line in re.sub(r"(?m)^(?!;(?:END)?FOLD)(.*?) ?;.*$", r"\1", text).split("\n"):
         marks = bytearray(len(line))
-        for each in constructs():
+        for each in all_constructs():
             for match in each.form.finditer(line):
                 marks[match.start() : match.end()] = b"\x01" * (match.end() - match.start())
         rest = "".join(" " if mark else letter for letter, mark in zip(line, marks, strict=True))
@@ -234,16 +234,16 @@ def test_the_default_example_lists_its_assumptions(tmp_path):
 
 
 def test_every_row_says_what_it_rests_on():
-    counts = Counter(each.sure for each in constructs())
-    print(f"{len(constructs())} constructs: {dict(counts)}")
+    counts = Counter(each.sure for each in all_constructs())
+    print(f"{len(all_constructs())} constructs: {dict(counts)}")
     assert set(counts) == {"right", "probable", "assumed"}
-    assert len({each.name for each in constructs()}) == len(constructs())
-    for each in constructs():
+    assert len({each.name for each in all_constructs()}) == len(all_constructs())
+    for each in all_constructs():
         assert each.relies, each.name
         assert set() < set(each.source) <= set(sources()), each.name
         assert bool(each.look) == (each.sure == "assumed"), each.name
         assert re.fullmatch(r"(KSS 8|RSI [345]|, )[\d. KSRI,]*", each.since), each.name
-    assert {name for each in constructs() for name in each.source} == set(sources())
+    assert {name for each in all_constructs() for name in each.source} == set(sources())
 
 
 def test_the_page_is_made_from_the_table():

@@ -79,12 +79,12 @@ def test_the_payload_bears_the_load_and_the_force_together():
     mass = np.linalg.norm(force_N, axis=1).max() / GRAVITY_M_S2
 
     def judged(rated_kg, own_kg, **more):
-        robot = {"model": "KR 300 R2500 ultra", "payload": {"mass_kg": rated_kg}}
-
         def loaded(cell):
-            return {"load": cell.load.model_copy(update={"mass_kg": own_kg})}
+            payload = cell.robot.payload.model_copy(update={"mass_kg": rated_kg})
+            robot = cell.robot.model_copy(update={"payload": payload})
+            return {"load": cell.load.model_copy(update={"mass_kg": own_kg}), "robot": robot}
 
-        return found(predicted(robot=robot, instead=loaded, **more), "payload")
+        return found(predicted(instead=loaded, **more), "payload")
 
     assert judged(1.02 * mass, 0.0) == []
     assert judged(0.98 * mass, 0.0)[0][0] == "error"

@@ -13,7 +13,7 @@ from markupsafe import escape
 from gcode2krl import load_cell, load_run, read_gcode, set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl.arcs import in_chords
-from gcode2krl.krl.constructs import constructs
+from gcode2krl.krl.constructs import all_constructs
 from gcode2krl.krl.read import read_krl
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit import make_kit
@@ -27,6 +27,7 @@ PART = (
     "G1 X30\nG0 Z50\nM5\nM30\n"
 )
 LIFT_MM = 100.0
+NO_TURN = {"a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
 ASSUMED = re.compile(r"^; ASSUMED, look at this in T1: (.*)$", re.MULTILINE)
 
 
@@ -100,7 +101,7 @@ def test_the_check_list_has_this_programs_values(program, tmp_path):
     itself = read_krl(program)
     first = itself.position_mm[1]
     assert f"X {first[0]:.2f} Y {first[1]:.2f} Z {first[2]:.2f} mm in $BASE, a PTP from HOME" in page
-    (pose,) = [s.text for s in itself.statements if s.motion == 2 and "$AXIS_ACT" in s.text]
+    pose = next(s.text for s in itself.statements if s.motion == 2 and "($AXIS_ACT" in s.text)
     a1, a2 = (float(re.search(rf"AXIS_ACT\.A{k}-\(?(-?[\d.]+)", pose)[1]) for k in (1, 2))
     assert f"A1 {a1:.1f}°  A2 {a2:.1f}°" in page
     for statement in itself.statements:
@@ -117,7 +118,7 @@ def test_the_check_list_says_what_to_look_at_in_this_program_alone(program, tmp_
     make_kit(program, tmp_path / "kit", load_cell())
     page = text_of(tmp_path / "kit" / "checklist.html")
     header = ASSUMED.findall(text_of(program))
-    looks = {each.look for each in constructs() if each.look}
+    looks = {each.look for each in all_constructs() if each.look}
     assert {look for look in looks if str(escape(look)) in page} == set(header) > set()
     assert "RSI Visual" not in page
 
@@ -183,7 +184,7 @@ def test_tools_are_those_of_the_motions(program):
     ("other", "what"),
     [
         (
-            {"frames": {"base": dict.fromkeys(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 1.0)}},
+            {"frames": {"base": {"x_mm": 1501.0, "y_mm": 0.0, "z_mm": 800.0} | NO_TURN}},
             "$BASE",
         ),
         ({"home": {"q_deg": [10.0, -90.0, 90.0, 0.0, 0.0, 0.0]}}, "HOME"),
