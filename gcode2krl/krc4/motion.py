@@ -263,7 +263,7 @@ def _with_external(
     moves = way.max(axis=1) > 0.0
     on_spot = moves & (length < 1e-9)
     length = np.where(on_spot, np.maximum(times_s, 1e-3) * speed, length)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # 0/0 where nothing moves
         limited = np.where(moves, np.minimum(speed, length / times_s), speed)
         per_mm = np.where(moves, (way / most_2).max(axis=1) / np.where(moves, length, 1.0), 0.0)
         slower = np.where(moves, np.minimum(acceleration, 1.0 / per_mm), acceleration)
