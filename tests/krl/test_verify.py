@@ -13,7 +13,8 @@ from gcode2krl.errors import NotUnderstoodError
 from tests.cells import OWN_CELL
 from tests.krl.replay import read_program
 
-verify_krl = partial(gcode2krl.verify_krl, forces=False)  # what is judged with forces: tests/cli/test_verify_hazards.py
+# what is judged with forces is tried in tests/cli/test_verify_hazards.py
+verify_krl = partial(gcode2krl.verify_krl, forces=False)
 
 
 def line_of(lines, pattern, occurrence=0):
