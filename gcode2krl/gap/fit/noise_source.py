@@ -26,6 +26,10 @@ _EXACT = 1e-12
 """The floor of drawn noise: it has no decimals."""
 _SLOW_DRAWS = 4
 """Of the slow part, whose lags are taken off the data's."""
+_LEVEL_S, _LEVELS = 0.1, 11
+"""Blocks whose medians are the level of a residual, and how many of them."""
+_FAR = 8.0
+"""Robust deviations from it beyond which a row is of an event: heavy tails hardly go there."""
 _SAME_MM = 1e-3
 _SAME_RAD = 1e-3
 """Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
@@ -51,7 +55,7 @@ def noise_of(
     )
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
-    residuals = [trace.measured - trace.sample(applied) for trace in traces]
+    residuals = [_without_spikes(trace, trace.measured - trace.sample(applied)) for trace in traces]
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
     slow = [
         _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
@@ -75,6 +79,30 @@ def noise_of(
         at_most(unbiased(noise, of_drawn, floor), most)
         for noise, of_drawn, floor in zip(first, again, floors, strict=True)
     ]
+
+
+def _without_spikes(trace: Trace, residual: Floats) -> Floats:
+    """Return a residual (n, k) without what is far from its level for a moment: an event is no noise.
+
+    Before anything else, since means, tones and signatures would spread it over rows that are calm. The level
+    is the median over a second or so, of medians over short blocks: it follows steps and whatever is slow.
+    """
+    from scipy.ndimage import median_filter
+
+    time_s = trace.time_s
+    number = ((time_s - time_s[0]) / _LEVEL_S).astype(np.int64)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(number) != 0]))
+    if len(starts) < _LEVELS:
+        return residual
+    parts = np.split(np.arange(len(time_s)), starts[1:])
+    middles_s = np.array([time_s[rows].mean() for rows in parts])
+    tame = np.empty_like(residual)
+    for j, values in enumerate(residual.T):
+        medians = median_filter([np.median(values[rows]) for rows in parts], size=_LEVELS, mode="nearest")
+        level = np.interp(time_s, middles_s, medians)
+        near = np.abs(values - level) <= _FAR * 1.4826 * float(np.median(np.abs(values - level)))
+        tame[:, j] = np.interp(time_s, time_s[near], values[near])
+    return tame
 
 
 def _of_rows(parts: Sequence[SlowPart], trace: Trace) -> tuple[Slow, ...]:
@@ -183,10 +211,15 @@ class _Source:
         return [(without_lines(value), self.traces[0].segments) for value in differences]
 
 
+def are_repeats(traces: Sequence[Trace]) -> bool:
+    """Tell whether runs repeat one program, so that their noise is what differs between them."""
+    return len(traces) > 1 and all(_is_repeat(trace, traces[0]) for trace in traces[1:])
+
+
 def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
     """Return for each trace the rows that belong to the first one's; None where they are no repeats."""
     first = traces[0]
-    if len(traces) < 2 or not all(_is_repeat(trace, first) for trace in traces[1:]):
+    if not are_repeats(traces):
         return None
     return [nearest_rows(trace.time_s, first.time_s) for trace in traces]
 
