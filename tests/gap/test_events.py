@@ -1,11 +1,13 @@
-"""Whose an event is: the command's, the machine's or the instrument's, and what is left out of the comparison."""
+"""Whose an event is: the command's, the machine's or the instrument's, and what is left out."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from gcode2krl.gap.beside.events import Whose, rough_spans, sorted_out
+from gcode2krl.gap.tell.events import events_of, impulses_of
 from tests.gap.constructed import motion, noise, trace
 
 STEP_S, SECONDS = 0.01, 20.0
@@ -85,7 +87,9 @@ def test_what_is_rough_in_step_with_the_command_stays():
     assert sorted_out(traces, {}) == traces
     # as many bursts elsewhere are the instrument's, each in its own places
     generator = np.random.default_rng(0)
-    elsewhere = [shaken(np.sort(generator.choice(CORNERS_S, 4, replace=False)) + 0.7, 10 + i) for i in range(3)]
+    elsewhere = [
+        shaken(np.sort(generator.choice(CORNERS_S, 4, replace=False)) + 0.7, 10 + i) for i in range(3)
+    ]
     assert set(kinds(sorted_out(runs(*elsewhere), {}))) == {Whose.INSTRUMENT}
 
 
@@ -138,3 +142,19 @@ def test_a_clock_a_lag_or_a_play_is_no_event():
     follows = 60.0 * rate / np.abs(rate).max()
     (late,) = runs(noise(COUNT, 3)[:, 0] + follows, inputs=inputs)
     assert not sorted_out([late], {})[0].events
+
+
+def test_the_answer_tells_moments_by_run_seconds_and_line():
+    (found,) = sorted_out(runs(noise(COUNT, 8)[:, 0] + blow(7.2)), {})
+    size = SimpleNamespace(excess_before=0.0, rows=COUNT)
+    judged = SimpleNamespace(
+        link=found.link, factor=2.0, traces=(found,), events=found.events, impulses=found.events, size=size
+    )
+    (event,) = events_of(judged)
+    assert (event.what, event.run, event.unit) == ("impulse", "run-1", "deg")
+    assert event.size == pytest.approx(120.0, rel=0.1)
+    assert event.t_s == pytest.approx(7.24, abs=0.02)
+    assert event.line == pytest.approx(724, abs=3)
+    (depends,) = impulses_of(judged)
+    assert (depends.form, depends.at, depends.run, depends.line) == ("impulse", "A1", "run-1", event.line)
+    assert depends.share == pytest.approx(1.0)

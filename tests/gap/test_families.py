@@ -220,4 +220,4 @@ def test_amplitudes_reach_from_a_tenth_of_the_noise_to_a_hundred_times_it():
     assert AMPLITUDES.tolist() == list(limits.amplitudes) == sorted(limits.amplitudes)
     assert AMPLITUDES[0] <= 0.1
     assert AMPLITUDES[-1] >= 100.0
-    assert limits.gap_p >= 1.0 / (1.0 + limits.flips)
+    assert limits.significant_p >= 1.0 / (1.0 + limits.flips)

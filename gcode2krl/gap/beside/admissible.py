@@ -146,7 +146,7 @@ class Admissible:
         return self._at(gradient(self._rate, self.trace.inputs.time_s))
 
     def jerk(self, joint: int) -> Floats:
-        """Return how fast a joint's commanded acceleration changes, (n, c): at once and as servos follow it."""
+        """Return how fast a joint's commanded acceleration changes, (n, c), as servos follow it."""
         inputs = self.trace.inputs
         jerk = gradient(gradient(self._rate[:, joint], inputs.time_s), inputs.time_s)
         follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]

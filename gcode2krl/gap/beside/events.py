@@ -5,8 +5,10 @@ the tracker, and it leaves nothing behind. So what is rough is compared with whe
 reversals, jumps of the predicted force), with repeats of the program, with the other tables and with the
 level before and after it:
 
-- in step with the command, or at the same place in all repeats: structure that effects must explain. It stays.
-- with a change that stays behind it: something slipped, which is told. It stays where it is that change alone.
+- in step with the command, or at the same place in all repeats: structure, and it
+  stays.
+- with a change that stays behind it: something slipped, which is told. It stays where it is
+  that change alone.
 - a pulse (`pulses`), or rough in two tables at once: an impulse of the machine. Its rows are a model of their
   own, so the rest is judged without them; it is told with moment, size and width, and is a gap.
 - else the instrument's: a burst. It is left out, and that is told.
@@ -25,7 +27,7 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Inputs
 from gcode2krl.gap.beside.admissible import Admissible
 from gcode2krl.gap.beside.bursts import loud_rows
-from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.holdout import with_rows
 from gcode2krl.gap.beside.pulses import pulse_rows
 from gcode2krl.gap.beside.trace import Trace
@@ -45,8 +47,6 @@ _MOMENT_S = 0.1
 """Over which changes of the rest are compared with those of the motion."""
 _FAR, _RIDGE = 6.0, 1e-6
 """Robust deviations beyond which a row does not tell what follows the motion; columns of unit mean square."""
-_NORMAL = 1.4826
-"""Standard deviation of a normal over its median absolute deviation."""
 _SAME_MM = 1e-3
 """Repeats of a program have the same path."""
 
@@ -168,12 +168,13 @@ def _rest(trace: Trace) -> Floats:
 
 def _fitted(columns: Floats, values: Floats) -> Floats:
     """Return the weights (c,) of columns for values (n,), those far off what they give left out."""
-    weights = np.zeros(columns.shape[1])
+    weights: Floats = np.zeros(columns.shape[1])
     for _ in range(2):
-        off = np.abs(values - columns @ weights - np.median(values - columns @ weights))
-        near = off <= _FAR * max(_NORMAL * float(np.median(off)), 1e-12)
+        off = values - columns @ weights - np.median(values - columns @ weights)
+        near = np.abs(off) <= _FAR * max(usual_deviation(off), 1e-12)
         x = columns[near]
-        weights = np.linalg.solve(x.T @ x + _RIDGE * len(x) * np.eye(x.shape[1]), x.T @ values[near])
+        gram = x.T @ x + _RIDGE * len(x) * np.eye(x.shape[1])
+        weights = np.asarray(np.linalg.solve(gram, x.T @ values[near]), dtype=np.float64)
     return weights
 
 
@@ -194,7 +195,7 @@ def _stretches(trace: Trace, rest: Floats) -> Iterator[_Stretch]:
 
 
 def _is_edge(trace: Trace, rest: Floats) -> Bools:
-    """Return the rows (n,) of a force that is off by less than its model changes there: an edge of the cut."""
+    """Return the rows (n,) of a force that is off by less than its model changes there: an edge."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     if trace.link.of_joints or trace.link.of_tip:
@@ -222,7 +223,7 @@ def _in_step(
     chosen: Sequence[Bools],
     least: int = _LIMITS.in_step_least,
 ) -> list[list[bool]]:
-    """Return which stretches of each trace fall into chosen rows (n,), more often than by chance; else none."""
+    """Return which stretches of each trace fall into chosen rows (n,); none where that may be chance."""
     from scipy.special import bdtrc
 
     inside = [
@@ -247,7 +248,9 @@ def _command_changes(trace: Trace) -> Bools:
     rate = np.gradient(inputs.q_cmd_rad, time_s, axis=0)
     acceleration = np.gradient(rate, time_s, axis=0)
     later = time_s + _JERK_STEP_S
-    jerk = np.abs(np.stack([np.interp(later, time_s, each) for each in acceleration.T], axis=1) - acceleration)
+    jerk = np.abs(
+        np.stack([np.interp(later, time_s, each) for each in acceleration.T], axis=1) - acceleration
+    )
     largest = np.maximum(jerk.max(axis=0), 1e-12)
     changes = (jerk / largest > _LIMITS.command_share).any(axis=1)
     moving = np.abs(rate) > 1e-3 * np.maximum(np.abs(rate).max(axis=0), 1e-12)
@@ -271,16 +274,15 @@ def _last_before(at_s: Floats, time_s: Floats) -> Floats:
     return last
 
 
-def _repeated(
-    traces: Sequence[Trace], stretches: Sequence[Sequence[_Stretch]], number: int
-) -> list[bool]:
+def _repeated(traces: Sequence[Trace], stretches: Sequence[Sequence[_Stretch]], number: int) -> list[bool]:
     """Return which stretches of a trace every other run of the same program has too, at the same time."""
     trace = traces[number]
     repeats = [i for i, other in enumerate(traces) if i != number and _is_repeat(trace, other)]
     if not repeats:
         return [False] * len(stretches[number])
     others = [
-        _at(trace, [_span(traces[i], each) for each in stretches[i] if not _is_outlier(each)]) for i in repeats
+        _at(trace, [_span(traces[i], each) for each in stretches[i] if not _is_outlier(each)])
+        for i in repeats
     ]
     everywhere = np.all(others, axis=0)
     # where all are rough most of the time that says nothing
@@ -377,14 +379,15 @@ class _Levels:
         count = len(self._rest)
         rows = range(count // _LEVELS, count - count // _LEVELS, max(1, count // _LEVELS))
         changes = np.stack([self._level(row + 1, 1) - self._level(row, -1) for row in rows])
-        usual: Floats = _NORMAL * np.median(np.abs(changes - np.median(changes, axis=0)), axis=0)
-        return usual
+        return np.array([usual_deviation(each - np.median(each)) for each in changes.T])
 
     def _level(self, row: int, way: int) -> Floats:
         """Return the median (k,) of the rows after (1) or before (-1) a row."""
         time_s = self.trace.time_s
         row = min(max(row, 0), len(time_s) - 1)
         end = int(np.searchsorted(time_s, time_s[row] + way * _LIMITS.change_level_s))
-        rows = self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
+        rows = (
+            self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
+        )
         level: Floats = np.median(rows, axis=0)
         return level

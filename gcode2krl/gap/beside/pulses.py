@@ -8,6 +8,7 @@ heavy tails move no median, and in a burst of the instrument every median moves.
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.gap.beside.decimals import usual_deviation
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.beside
@@ -16,10 +17,6 @@ _LEAST_ROWS = 5
 _FOURTH = (1.0, -4.0, 6.0, -4.0, 1.0)
 _OF_HEIGHT = 0.25
 """Rows that are off by less of a pulse's height are beside it."""
-_NORMAL = 1.4826
-"""Standard deviation of a normal over its median absolute deviation."""
-_NORMAL_MEAN = 1.2533
-"""The same over its mean absolute deviation."""
 
 
 def pulse_rows(time_s: Floats, values: Floats, segments: Ints, least: Floats) -> Bools:
@@ -48,7 +45,7 @@ def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bool
     for width_s in _LIMITS.pulse_widths_s:
         width = max(_rows(width_s, step_s), _LEAST_ROWS)
         middle = median_filter(left, size=width, mode="nearest")
-        usual = max(_usual(np.abs(middle)), least)
+        usual = max(usual_deviation(middle), least)
         if usual > 0.0:
             rough = _roughness(left, 2 * width + 1)
             far = np.abs(middle) > _LIMITS.pulse_deviations * usual * rough
@@ -57,19 +54,10 @@ def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bool
     return pulsed
 
 
-def _usual(sizes: Floats) -> float:
-    """Return the usual deviation of sizes (n,), the largest twentieth as large as the others.
-
-    Where decimals are coarse most sizes are nothing, and the median alone would be, too.
-    """
-    mean = float(np.mean(np.minimum(sizes, np.percentile(sizes, 95.0))))
-    return max(_NORMAL * float(np.median(sizes)), _NORMAL_MEAN * mean)
-
-
 def _roughness(values: Floats, around: int) -> Floats:
     """Return how rough the surroundings of each row (n,) are, over how rough the run usually is; at least 1.
 
-    By the median of fourth differences: a pulse has rough edges, a burst of the instrument is rough all along.
+    By the median of fourth differences: a pulse has rough edges, a burst is rough all along.
     """
     from scipy.ndimage import median_filter
 

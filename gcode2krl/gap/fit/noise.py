@@ -77,7 +77,7 @@ class Noise:
         return innovations(values, segments, self.a, self._slow, gains, variances)
 
     def calm_rows(self, values: Floats, segments: Ints) -> Bools:
-        """Return which rows (n,) of values (n,) are no louder, whitened, than the median stretch is by far."""
+        """Return which rows (n,) of values (n,) are, whitened, about as loud as the median window."""
         white_, calm = self.whiten(values[:, None], segments)[:, 0], np.ones(len(values), dtype=np.bool_)
         lengths = segments[:, 1] - segments[:, 0]
         windows = np.concatenate([np.arange(count) // _WINDOW for count in lengths])

@@ -7,7 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.blocks import block_means
@@ -100,7 +100,7 @@ def _without_spikes(trace: Trace, residual: Floats) -> Floats:
     for j, values in enumerate(residual.T):
         medians = median_filter([np.median(values[rows]) for rows in parts], size=_LEVELS, mode="nearest")
         level = np.interp(time_s, middles_s, medians)
-        near = np.abs(values - level) <= _FAR * 1.4826 * float(np.median(np.abs(values - level)))
+        near = np.abs(values - level) <= _FAR * usual_deviation(values - level)
         tame[:, j] = np.interp(time_s, time_s[near], values[near])
     return tame
 

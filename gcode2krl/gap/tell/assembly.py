@@ -64,7 +64,9 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
-        next_run=next_run_of(context, signals, [each for each in unexplained.depends_on if each.form != IMPULSE]),
+        next_run=next_run_of(
+            context, signals, [each for each in unexplained.depends_on if each.form != IMPULSE]
+        ),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),

@@ -71,13 +71,11 @@ def _hit(gap: Gap) -> str:
         said = f"The {where} jumps {at}, for {amount(max(event.lasts_s, 1e-3), 's')}: {size}"
     if step is None:
         return said
-    size = next((value for name, value in step.parameters.items() if name.startswith("size_")), None)
-    unit = next((unit_of(name)[1] for name in step.parameters if name.startswith("size_")), "")
-    if size is None:
+    name = next((name for name in step.parameters if name.startswith("size_")), None)
+    if name is None:
         return said
-    return f"{said}; since then {'the tip' if step.target == 'tip' else step.target} is off by " + (
-        f"{number(abs(size.value))} {unit}"
-    )
+    off = f"{number(abs(step.parameters[name].value))} {unit_of(name)[1]}"
+    return f"{said}; since then {'the tip' if step.target == 'tip' else step.target} is off by {off}"
 
 
 def _is_at(moment: MomentResult | None, event: EventResult) -> bool:

@@ -15,8 +15,6 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
 _REPEATS, _RUNS = "repeats", "each run by itself"
-_SAME = 1.05
-"""Two readings of the noise that are nearer to each other are one."""
 
 
 def noise_of(judgement: Judgement) -> NoiseResult | None:
@@ -44,8 +42,9 @@ def readings_of_noise(judgements: Sequence[Judgement]) -> Iterator[str]:
         if noise is None or noise.stated is not None or noise.source == _REPEATS:
             continue
         unit = judgement.link.unit
-        said = f"{judgement.link.name}: the noise is neither stated nor repeated; taken as {number(noise.learnt)} {unit}"
-        if noise.learnt > _SAME * noise.short:
+        said = f"{judgement.link.name}: the noise is neither stated nor repeated; "
+        said += f"taken as {number(noise.learnt)} {unit}"
+        if noise.learnt > _LIMITS.same_reading * noise.short:
             said += (
                 f", of which {number(noise.short)} {unit} are forgotten within milliseconds: "
                 "what wanders within seconds may be a gap"
@@ -67,14 +66,9 @@ def _above_stated(judgement: Judgement, noise: NoiseResult) -> Iterator[Issue]:
     most = THRESHOLDS.fit.noise_most_stated
     if noise.stated is None or noise.short < 0.999 * most * noise.stated:
         return
-    unit = judgement.link.unit
-    yield Issue(
-        "warning",
-        "noise-above-stated",
-        0,
-        f"{judgement.link.name}: the readings are noisier than the {number(noise.stated)} {unit} that run.toml "
-        f"states; {number(noise.short)} {unit} are taken as noise, the rest is not explained by it",
-    )
+    known, taken = (f"{number(each)} {judgement.link.unit}" for each in (noise.stated, noise.short))
+    message = f"noisier than the {known} that run.toml states; no more than {taken} is taken as noise"
+    yield Issue("warning", "noise-above-stated", 0, f"{judgement.link.name}: {message}")
 
 
 def _in_steps(judgement: Judgement, noise: NoiseResult) -> Iterator[Issue]:
@@ -88,13 +82,10 @@ def _in_steps(judgement: Judgement, noise: NoiseResult) -> Iterator[Issue]:
             coarse[name] = step
     if not coarse:
         return
-    unit, names = judgement.link.unit, listed(list(coarse))
+    steps, least = (f"{number(each)} {judgement.link.unit}" for each in (max(coarse.values()), known))
+    message = f"readings in a ladder of {steps}, the noise is {least}"
     yield Issue(
-        "warning",
-        "readings-in-steps",
-        0,
-        f"{judgement.link.name}, {names}: readings in a ladder of {number(max(coarse.values()))} {unit}, "
-        f"the noise is {number(known)} {unit}",
+        "warning", "readings-in-steps", 0, f"{judgement.link.name}, {listed(list(coarse))}: {message}"
     )
 
 
@@ -108,10 +99,7 @@ def _bursts(judgement: Judgement) -> Iterator[Issue]:
         lasts_s = sum(each.span_s[1] - each.span_s[0] for each in bursts)
         shown = [f"{each.at_s:.2f} s (line {each.line})" for each in bursts[: _LIMITS.most_bursts]]
         more = f" and {len(bursts) - len(shown)} more" if len(bursts) > len(shown) else ""
-        yield Issue(
-            "note",
-            "instrument-bursts",
-            0,
-            f"{trace.run}: {judgement.link.name}: rough for {lasts_s:.2f} s in all, at {', '.join(shown)}{more}, "
-            f"up to {number(largest)} {judgement.link.unit}: left out as the instrument's, in step with nothing",
-        )
+        size = f"{number(largest)} {judgement.link.unit}"
+        message = f"rough for {lasts_s:.2f} s in all, up to {size}, at {', '.join(shown)}{more}"
+        said = f"{trace.run}: {judgement.link.name}: {message}: left out, in step with nothing"
+        yield Issue("note", "instrument-bursts", 0, said)

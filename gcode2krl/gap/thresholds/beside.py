@@ -82,7 +82,7 @@ class BesideThresholds:
         (0.02, 0.05, 0.1), "of pulses that are looked for: blows and snags take 20 to 100 ms"
     )
     pulse_deviations: float = calibrated(
-        10.0, DEVELOPMENT, "robust deviations of a pulse; noise, heavy tails and bursts make one in 300 runs"
+        12.0, DEVELOPMENT, "robust deviations of a pulse; one in 1600 signals of tails, bursts and slow noise"
     )
     event_apart_s: float = convention(0.1, "rough rows that are nearer to each other are one event")
     command_share: float = convention(
