@@ -26,8 +26,8 @@ _EXACT = 1e-12
 """The floor of drawn noise: it has no decimals."""
 _SLOW_DRAWS = 4
 """Of the slow part, whose lags are taken off the data's."""
-_LEVEL_S, _LEVELS = 0.1, 11
-"""Blocks whose medians are the level of a residual, and how many of them."""
+_LEVEL_S, _LEVELS = 0.1, 5
+"""Blocks whose medians are the level of a residual, and how many before and after."""
 _FAR = 8.0
 """Robust deviations from it beyond which a row is of an event: heavy tails hardly go there."""
 _SAME_MM = 1e-3
@@ -85,22 +85,23 @@ def _without_spikes(trace: Trace, residual: Floats) -> Floats:
     """Return a residual (n, k) without what is far from its level for a moment: an event is no noise.
 
     Before anything else, since means, tones and signatures would spread it over rows that are calm. The level
-    is the median over a second or so, of medians over short blocks: it follows steps and whatever is slow.
+    lies between the medians of half a second before and after: it follows steps and whatever is slow.
     """
-    from scipy.ndimage import median_filter
-
     time_s = trace.time_s
     number = ((time_s - time_s[0]) / _LEVEL_S).astype(np.int64)
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(number) != 0]))
-    if len(starts) < _LEVELS:
+    block = np.cumsum(np.concatenate([[0], np.diff(number) != 0]))
+    if block[-1] < 2 * _LEVELS:
         return residual
-    parts = np.split(np.arange(len(time_s)), starts[1:])
-    middles_s = np.array([time_s[rows].mean() for rows in parts])
+    parts = np.split(np.arange(len(time_s)), np.flatnonzero(np.diff(block)) + 1)
     tame = np.empty_like(residual)
     for j, values in enumerate(residual.T):
-        medians = median_filter([np.median(values[rows]) for rows in parts], size=_LEVELS, mode="nearest")
-        level = np.interp(time_s, middles_s, medians)
-        near = np.abs(values - level) <= _FAR * usual_deviation(values - level)
+        medians = np.array([np.median(values[rows]) for rows in parts])
+        padded = np.pad(medians, _LEVELS, mode="edge")
+        levels = np.median(np.lib.stride_tricks.sliding_window_view(padded, _LEVELS), axis=1)
+        before, after = levels[: len(medians)], levels[_LEVELS + 1 :]
+        low, high = np.minimum(before, after)[block], np.maximum(before, after)[block]
+        off = values - np.clip(values, low, high)
+        near = np.abs(off) <= _FAR * usual_deviation(values - medians[block])
         tame[:, j] = np.interp(time_s, time_s[near], values[near])
     return tame
 
