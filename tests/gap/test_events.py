@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap.beside.events import Whose, rough_spans, sorted_out
+from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.tell.events import events_of, impulses_of
-from tests.gap.constructed import motion, noise, trace
+from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 STEP_S, SECONDS = 0.01, 20.0
 COUNT = round(SECONDS / STEP_S)
@@ -158,3 +159,24 @@ def test_the_answer_tells_moments_by_run_seconds_and_line():
     (depends,) = impulses_of(judged)
     assert (depends.form, depends.at, depends.run, depends.line) == ("impulse", "A1", "run-1", event.line)
     assert depends.share == pytest.approx(1.0)
+
+
+def test_a_following_error_in_step_with_the_jerk_is_a_gap_and_depends_on_it():
+    """Twice the noise, nearly all of it at corners: it hardly raises the noise and none of it is left out."""
+
+    def servo(number):
+        jerk = np.gradient(np.gradient(np.gradient(stop_and_go().q_cmd_rad[:, 0], TIME_S), TIME_S), TIME_S)
+        follows = np.convolve(jerk, np.exp(-np.arange(12) / 2.0), mode="full")[:COUNT]
+        return noise(COUNT, 30 + number)[:, 0] + 2.0 * follows / np.std(follows)
+
+    traces = sorted_out(runs(*(servo(number) for number in range(3))), {})
+    assert [each.shape[0] for each in traces] == [COUNT] * 3
+    found = judge(LINK["servo"], traces, [], question([wave(0.37)]))
+    assert found.verdict == "unexplained"
+    assert found.examination.noise[0].short_sigma < 1.25
+    best = found.rest.study.evidences[0]
+    assert best.place.name == "A1"
+    assert best.on.value in (
+        "jerk",
+        "acceleration",
+    )  # the one is nearly a function of the other where it stops

@@ -55,7 +55,7 @@ def noise_of(
     )
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
-    residuals = [_without_spikes(trace, trace.measured - trace.sample(applied)) for trace in traces]
+    residuals = source.without_spikes([trace.measured - trace.sample(applied) for trace in traces])
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
     slow = [
         _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
@@ -81,20 +81,20 @@ def noise_of(
     ]
 
 
-def _without_spikes(trace: Trace, residual: Floats) -> Floats:
-    """Return a residual (n, k) without what is far from its level for a moment: an event is no noise.
+def _spikes(trace: Trace, rest: Floats) -> Floats:
+    """Return what of a rest (n, k) is far from its level for a moment, beyond a bridge from row to row.
 
-    Before anything else, since means, tones and signatures would spread it over rows that are calm. The level
-    lies between the medians of half a second before and after: it follows steps and whatever is slow.
+    The level lies between the medians of half a second before and after: it follows steps and whatever is
+    slow.
     """
     time_s = trace.time_s
     number = ((time_s - time_s[0]) / _LEVEL_S).astype(np.int64)
     block = np.cumsum(np.concatenate([[0], np.diff(number) != 0]))
     if block[-1] < 2 * _LEVELS:
-        return residual
+        return np.zeros_like(rest)
     parts = np.split(np.arange(len(time_s)), np.flatnonzero(np.diff(block)) + 1)
-    tame = np.empty_like(residual)
-    for j, values in enumerate(residual.T):
+    spikes = np.empty_like(rest)
+    for j, values in enumerate(rest.T):
         medians = np.array([np.median(values[rows]) for rows in parts])
         padded = np.pad(medians, _LEVELS, mode="edge")
         levels = np.median(np.lib.stride_tricks.sliding_window_view(padded, _LEVELS), axis=1)
@@ -102,8 +102,8 @@ def _without_spikes(trace: Trace, residual: Floats) -> Floats:
         low, high = np.minimum(before, after)[block], np.maximum(before, after)[block]
         off = values - np.clip(values, low, high)
         near = np.abs(off) <= _FAR * usual_deviation(values - medians[block])
-        tame[:, j] = np.interp(time_s, time_s[near], values[near])
-    return tame
+        spikes[:, j] = values - np.interp(time_s, time_s[near], values[near])
+    return spikes
 
 
 def _of_rows(parts: Sequence[SlowPart], trace: Trace) -> tuple[Slow, ...]:
@@ -175,6 +175,14 @@ class _Source:
     traces: tuple[Trace, ...]
     explained: tuple[_Explained, ...]
     repeats: list[Ints] | None
+
+    def without_spikes(self, residuals: Sequence[Floats]) -> list[Floats]:
+        """Return residuals (n, k) less what is far off for a moment and nothing explains: no noise is that.
+
+        Before anything else, since means and tones would spread it over rows that are calm.
+        """
+        parts = zip(self.traces, self.explained, residuals, strict=True)
+        return [each - _spikes(trace, explained.off(each)) for trace, explained, each in parts]
 
     def noise(
         self,

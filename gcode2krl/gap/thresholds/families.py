@@ -30,7 +30,7 @@ class FamilyThresholds:
     least_evidence: float = convention(4.6, "log 100: less evidence, over its inflation, is none")
 
     gap_p: float = convention(
-        1e-4, "of the best family by the distribution of the largest over flips: five links, one run in 2000"
+        1e-3, "of the best family by the distribution of the largest over flips: five links, one run in 200"
     )
     gap_evidence: float = calibrated(
         23.0, DEVELOPMENT, "log 1e10, over the inflation: tones at 1.3 times the noise have 60 and more"
