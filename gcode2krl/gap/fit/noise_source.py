@@ -88,17 +88,17 @@ def _spikes(trace: Trace, rest: Floats) -> Floats:
     slow.
     """
     time_s = trace.time_s
-    number = ((time_s - time_s[0]) / _LEVEL_S).astype(np.int64)
-    block = np.cumsum(np.concatenate([[0], np.diff(number) != 0]))
-    if block[-1] < 2 * _LEVELS:
+    length = max(1, round(_LEVEL_S / float(np.median(np.diff(time_s)))))
+    count = len(time_s) // length
+    if count < 2 * _LEVELS:
         return np.zeros_like(rest)
-    parts = np.split(np.arange(len(time_s)), np.flatnonzero(np.diff(block)) + 1)
+    block = np.minimum(np.arange(len(time_s)) // length, count - 1)
     spikes = np.empty_like(rest)
     for j, values in enumerate(rest.T):
-        medians = np.array([np.median(values[rows]) for rows in parts])
+        medians = np.median(values[: count * length].reshape(count, length), axis=1)
         padded = np.pad(medians, _LEVELS, mode="edge")
         levels = np.median(np.lib.stride_tricks.sliding_window_view(padded, _LEVELS), axis=1)
-        before, after = levels[: len(medians)], levels[_LEVELS + 1 :]
+        before, after = levels[:count], levels[_LEVELS + 1 :]
         low, high = np.minimum(before, after)[block], np.maximum(before, after)[block]
         off = values - np.clip(values, low, high)
         near = np.abs(off) <= _FAR * usual_deviation(values - medians[block])
