@@ -104,10 +104,12 @@ class Rest:
         best = max(self.study.evidences, key=net_gain, default=None)
         if best is None:
             return False
-        nats = best.nats / best.inflation
+        is_rare = self.study.tail_p <= _LIMITS.gap_p
+        if is_rare and best.nats / best.inflation >= _LIMITS.gap_evidence:
+            return True
         # few strong stretches have few signs to flip; beyond all that models are off by, none are needed
-        is_rare = self.study.tail_p <= _LIMITS.gap_p and nats >= _LIMITS.gap_evidence
-        return is_rare or nats >= _LIMITS.certain_evidence
+        most = max(each.nats / each.inflation for each in self.study.evidences)
+        return most >= _LIMITS.certain_evidence
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
