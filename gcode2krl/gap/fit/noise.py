@@ -106,10 +106,13 @@ def fit(
     floor: float,
     slow: Sequence[tuple[Floats, Ints]] = (),
     order: int = _LIMITS.noise_order,
+    *,
+    every_row: bool = False,
 ) -> Noise:
     """Return the short part of some residuals (n,) with their segments, by least squares over calm rows.
 
-    Windows of rows that are far louder than the median one are events and take no part (`calm_rows`).
+    Windows of rows that are far louder than the median one are events and take no part (`calm_rows`), but
+    where ``every_row`` counts.
     ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less. ``slow``:
     draws of the slow part; the power of their lags is taken off that of the residuals.
     """
@@ -117,7 +120,8 @@ def fit(
     if len(lagged) < _LIMITS.noise_least_rows:
         values = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
         return white(max(float(np.sqrt(np.mean(values**2))), floor))
-    lagged = lagged[calm_rows(lagged, windows, floor)]
+    if not every_row:
+        lagged = lagged[calm_rows(lagged, windows, floor)]
     products = lagged.T @ lagged / len(lagged)
     if slow:
         drawn, _ = _lagged(slow, order)

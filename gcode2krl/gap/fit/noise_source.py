@@ -181,6 +181,8 @@ class _Source:
 
         Before anything else, since means and tones would spread it over rows that are calm.
         """
+        if not self.traces[0].link.has_instrument:
+            return list(residuals)
         parts = zip(self.traces, self.explained, residuals, strict=True)
         return [each - _spikes(trace, explained.off(each)) for trace, explained, each in parts]
 
@@ -200,7 +202,10 @@ class _Source:
         found = []
         for j, (floor, parts) in enumerate(zip(floors, slow, strict=True)):
             off = [own for each in drawn for own in self._component(each, j)] if parts else []
-            found.append(replace(fit(self._component(rests, j), floor, off), slow=parts))
+            # what is commanded has no instrument: where its model is off, at corners, it is so of all rows
+            every_row = not self.traces[0].link.has_instrument
+            short = fit(self._component(rests, j), floor, off, every_row=every_row)
+            found.append(replace(short, slow=parts))
         return found
 
     def _rests(self, values: Sequence[Floats]) -> list[Floats]:
