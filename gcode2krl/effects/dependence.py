@@ -42,6 +42,8 @@ class Dependence(Enum):
     VELOCITY = "velocity"
     """How fast the signal itself changes: a joint, the tip, or a force."""
     ACCELERATION = "acceleration"
+    JERK = "jerk"
+    """Commanded: what a servo is behind or ahead where the acceleration changes."""
     FORCE = "force"
     FORCE_BY_PLACE = "force by place"
     METRES_CUT = "metres cut"

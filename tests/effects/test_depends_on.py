@@ -138,6 +138,7 @@ def inputs_by_name(run, joint, y, at_tip):
         D.OWN_TORQUE: np.concatenate(torque, axis=1),
         D.VELOCITY: np.gradient(signal, t, axis=0),
         D.ACCELERATION: np.gradient(np.gradient(signal, t, axis=0), t, axis=0),
+        D.JERK: np.gradient(np.gradient(np.gradient(signal, t, axis=0), t, axis=0), t, axis=0),
         D.FORCE: force,
         D.FORCE_BY_PLACE: np.concatenate([force[:, :3]] + [force[:, [i]] * pose for i in range(3)], axis=1),
         D.METRES_CUT: cut_m[:, None],

@@ -37,7 +37,7 @@ def _cause(**more):
 
 def _link(**more):
     return LinkResult(
-        link="gear", rms_before=1.0, rms_after=0.5, noise=0.4, unit="deg", verdict="explained", **more
+        link="gear", rms_before=1.0, rms_after=0.5, floor=0.4, unit="deg", verdict="explained", **more
     )
 
 
@@ -63,6 +63,7 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
         "at_part",
         "links",
         "where",
+        "events",
         "causes",
         "unexplained",
         "not_examined",

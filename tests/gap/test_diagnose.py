@@ -197,3 +197,26 @@ def test_the_report_begins_with_a_sentence():
 
 def test_every_cause_of_the_library_has_a_link():
     assert all(effect.links for effect in LIBRARY.values() if effect.kind == "cause")
+
+
+def test_a_collision_is_told_with_moment_line_and_force_and_what_it_left_behind():
+    """A blow of 1.1 kN in the second run, by which A2 slips by 0.0225 deg."""
+
+    def struck(name, values, stamps, signals, number):
+        since = (stamps - 8.0) / 0.05
+        pulse = np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
+        blow_N = 1100.0 * pulse[:, None] * np.array([0.6, 0.0, 0.8])
+        return values + blow_N if name == "force_N" and number == 1 else values
+
+    slipped = applied("step:target=A2,at_s=1808.025,size_deg=0.0225")
+    gap = diagnose(prediction(), runs(slipped, extra=struck, load_encoders=True))
+    (event,) = [each for each in gap.events if each.link == "force"]
+    assert (event.what, event.run) == ("impulse", "run-2")
+    assert event.t_s == pytest.approx(8.025, abs=0.02)
+    assert event.size == pytest.approx(1100.0, rel=0.05)
+    hit = f"The tool hit something at {event.t_s:.2f} s of run-2, line {event.line}: 1.1 kN"
+    assert text_report(gap).startswith(hit)
+    # the runs do not say when they began, so that the step of run-2 is nobody's in particular
+    step = gap.unexplained.depends_on[0]
+    assert (step.form, step.at, step.run, step.line) == ("step", "A2", "run-2", event.line)
+    assert step.size == pytest.approx(0.0225, rel=0.05)

@@ -220,4 +220,12 @@ def test_amplitudes_reach_from_a_tenth_of_the_noise_to_a_hundred_times_it():
     assert AMPLITUDES.tolist() == list(limits.amplitudes) == sorted(limits.amplitudes)
     assert AMPLITUDES[0] <= 0.1
     assert AMPLITUDES[-1] >= 100.0
-    assert limits.gap_p >= 1.0 / (1.0 + limits.flips)
+    assert limits.significant_p >= 1.0 / (1.0 + limits.flips)
+
+
+def test_the_tail_goes_on_where_the_flips_end():
+    sound = [best_of(joint_traces(lambda own, run: 0.0 * own.hours, seed=10 * i)).tail_p for i in range(6)]
+    assert min(sound) > 1e-3
+    strong = best_of(joint_traces(lambda own, run: 8.0 * own.rate_rad_s[:, 0]))
+    assert strong.p == pytest.approx(1.0 / 201.0)
+    assert strong.tail_p < 0.1 * strong.p

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.tell.first_sentence import amount, headline, stretch
-from gcode2krl.gap.tell.result import AtPart, JointResult, PhaseResult, Where
+from gcode2krl.gap.tell.result import AtPart, EventResult, JointResult, MomentResult, PhaseResult, Where
 from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, TIP, UNEXPLAINED, UNSURE
 
 
@@ -116,3 +117,43 @@ def test_amounts_and_stretches():
     assert amount(0.0031, "mm") == "0.0031 mm"
     assert stretch(STRETCH) == "run-1: 2.00-4.00 s, lines 120-131"
     assert stretch(replace(STRETCH, lines=(), t_start_s=-0.001)) == "run-1: 0.00-4.00 s"
+
+
+BLOW = EventResult(
+    link="force", run="run-2", t_s=11.8, line=42, what="impulse", size=1154.0, unit="N", lasts_s=0.04
+)
+SLIPPED = replace(
+    LAG,
+    effect="step",
+    target="A2",
+    probability=0.9,
+    parameters={"at_s": Interval(6384.0, 6383.9, 6384.1), "size_deg": Interval(-0.0225, -0.023, -0.022)},
+    moment=MomentResult(run="run-2", t_s=11.82, line=42),
+)
+
+
+def test_what_happened_is_told_before_the_step_that_it_left_behind():
+    hit = replace(GAP, causes=(SLIPPED,), events=(BLOW,))
+    assert headline(hit).startswith(
+        "The tool hit something at 11.80 s of run-2, line 42: 1.2 kN; since then A2 is off by 0.0225 deg. "
+        "The tip is off by 0.41 mm RMS: step of A2, at 11.82 s of run-2, line 42, -0.0225 deg"
+    )
+    later = replace(SLIPPED, moment=MomentResult(run="run-2", t_s=14.0, line=50))
+    assert "since then" not in headline(replace(GAP, causes=(later,), events=(BLOW,)))
+
+
+def test_one_reading_alone_is_no_blow_and_a_burst_is_not_in_the_first_sentence():
+    alone = replace(
+        GAP,
+        verdict="unexplained",
+        causes=(),
+        events=(BLOW,),
+        unexplained=replace(UNEXPLAINED.unexplained, depends_on=()),
+    )
+    assert headline(alone) == (
+        "The force jumps at 11.80 s of run-2, line 42, for 40 ms: 1.2 kN. "
+        "What else the runs differ by, noise and normal mismatch explain."
+    )
+    tip = replace(BLOW, link="mechanics", size=0.6, unit="mm")
+    assert headline(replace(alone, events=(BLOW, tip))).startswith("The tool hit something")
+    assert headline(replace(GAP, events=(replace(BLOW, what="burst"),))) == headline(GAP)

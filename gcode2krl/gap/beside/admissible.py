@@ -21,6 +21,8 @@ _PLAYS_RAD = (1e-4, 1e-3, 1e-2)
 """Half-widths of play: 0.006°, 0.06° and 0.6° cover what gears have."""
 _SETTLES_S = (0.05, 0.3)
 """After a reversal: a stick-slip spike, and what an arm needs to come to rest."""
+_FOLLOWS_S = (0.004, 0.01, 0.025)
+"""Time constants of a servo's two lags behind a jerk."""
 _WARMS_S = (2.0, 8.0, 30.0)
 """Time constants with which a spindle grows after it has started."""
 _PLAYS_TORQUE = (0.1, 0.4)
@@ -142,6 +144,13 @@ class Admissible:
     def acceleration_rad_s2(self) -> Floats:
         """(n, 6) accelerations of the joints."""
         return self._at(gradient(self._rate, self.trace.inputs.time_s))
+
+    def jerk(self, joint: int) -> Floats:
+        """Return how fast a joint's commanded acceleration changes, (n, c), as servos follow it."""
+        inputs = self.trace.inputs
+        jerk = gradient(gradient(self._rate[:, joint], inputs.time_s), inputs.time_s)
+        follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]
+        return self._at(np.stack(follows, axis=1))
 
     @cached_property
     def _rate(self) -> Floats:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.interpolation import LastPath, interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.events import Event
 
 LIMITS = THRESHOLDS.beside
 
@@ -108,6 +112,8 @@ class Trace:
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
     """What was taken out of the measured values because it is the instrument's, in a person's words."""
+    events: "tuple[Event, ...]" = ()
+    """What was rough or far off for a moment and is not in step with the command (`events`)."""
 
     @property
     def signal(self) -> str:

@@ -91,8 +91,6 @@ class Rest:
     study: Study
     gap_gain: float
     """Fall of chi2 by all that is known to explain the gap: the power of the gap beyond noise."""
-    blocks: int
-    """Number of whitened values."""
     is_sized: bool = False
     """Its size alone is significant: then families need not prove that there is a rest."""
 
@@ -104,10 +102,14 @@ class Rest:
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
         best = max(self.study.evidences, key=net_gain, default=None)
-        if best is None or self.study.p > _LIMITS.gap_p:
+        if best is None:
             return False
-        certain = best.nats / best.inflation >= _LIMITS.gap_evidence
-        return certain and net_gain(best) >= _LIMITS.gap_power * self.blocks
+        is_rare = self.study.tail_p <= _LIMITS.gap_p
+        if is_rare and best.nats / best.inflation >= _LIMITS.gap_evidence:
+            return True
+        # few strong stretches have few signs to flip; beyond all that models are off by, none are needed
+        most = max(each.nats / each.inflation for each in self.study.evidences)
+        return most >= _LIMITS.certain_evidence
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
@@ -117,7 +119,7 @@ class Rest:
         return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 
 
-NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0, 0)
+NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0)
 """The rest of a link that families are not asked about."""
 
 
@@ -136,7 +138,7 @@ class LinkFamilies:
         outs = [self._without((number,)) for number in numbers]
         everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
         self._bare = self._without(numbers)
-        self.rest = Rest(everything, self._gap_gain(everything.evidences, None), len(self._rows))
+        self.rest = Rest(everything, self._gap_gain(everything.evidences, None))
         """Beside all accepted effects."""
         self.tests = tuple(
             self._tests(number, out, study)

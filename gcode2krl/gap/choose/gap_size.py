@@ -53,6 +53,8 @@ class Size:
     largest_after: float
     freedom: float = np.inf
     """Degrees of freedom of the deviation."""
+    calm_excess: float = 0.0
+    """The excess of rows that are no louder than usual: events and heavy tails are not of its test."""
 
     @property
     def power(self) -> float:
@@ -62,8 +64,7 @@ class Size:
     @property
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
-        certain = _as_many_deviations(self.freedom) * self.deviation
-        return self.excess > max(certain, _LIMITS.significant_share * self.noise)
+        return self.calm_excess > _as_many_deviations(self.freedom) * self.deviation
 
     @property
     def share_left(self) -> float:
@@ -95,6 +96,7 @@ def pooled(sizes: Sequence[Size]) -> Size:
         deviation=mean([size.deviation for size in sizes]) / len(sizes) ** 0.5,
         largest_before=max(size.largest_before for size in sizes),
         largest_after=max(size.largest_after for size in sizes),
+        calm_excess=mean([size.calm_excess for size in sizes]),
         freedom=sum(size.freedom for size in sizes),
     )
 
@@ -126,6 +128,7 @@ def size_of_gap(
         deviation=deviation,
         largest_before=_largest(before),
         largest_after=_largest(after),
+        calm_excess=_calm_mean_square(traces, structured, noise) - sigma2,
         freedom=freedom,
     )
 
@@ -142,6 +145,16 @@ def _squares(values: Floats) -> Floats:
 
 def _mean_square(values: Sequence[Floats]) -> float:
     return float(np.mean(np.concatenate([_squares(each) for each in values])))
+
+
+def _calm_mean_square(traces: Sequence[Trace], values: Sequence[Floats], noise: Sequence[Noise]) -> float:
+    """Return the mean square of values (n, k), of each component over its calm rows."""
+    power = 0.0
+    for j, own in enumerate(noise):
+        columns = [each[:, j] for each in values]
+        calm = [own.calm_rows(x, trace.segments) for x, trace in zip(columns, traces, strict=True)]
+        power += float(np.mean(np.concatenate([x[rows] for x, rows in zip(columns, calm, strict=True)]) ** 2))
+    return power
 
 
 def _largest(values: Sequence[Floats]) -> float:

@@ -38,7 +38,7 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     found = examine(link, traces, question, known)
     every = (*traces, *held)
     if not found.causes:
-        return _without_causes(found, every)
+        return _with_impulses(_without_causes(found, every))
     families = LinkFamilies(found, every)
     trials = list(_trials(found, held))
     counts = range(len(found.causes) + 1)
@@ -50,7 +50,15 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     judged = _judgement(found, sizes, whole, families, trials)
     with_named = _size_with_named(judged, sizes, trials)
     judged = replace(judged, every=every, size_with_named=with_named)
-    return judged if judged.verdict != "explained" else _beside_its_rest(judged, whole)
+    return _with_impulses(judged if judged.verdict != "explained" else _beside_its_rest(judged, whole))
+
+
+def _with_impulses(judged: Judgement) -> Judgement:
+    """Return the judgement: an impulse of the machine is a gap whose rows no other test has."""
+    if judged.impulses and judged.verdict in ("no_gap", "explained"):
+        verdict = "unexplained" if judged.verdict == "no_gap" else "partly_explained"
+        return replace(judged, verdict=verdict, nearly_all=judged.verdict == "explained")
+    return judged
 
 
 def _beside_its_rest(judged: Judgement, whole: Size) -> Judgement:

@@ -179,6 +179,8 @@ class Grid:
         if place.joint is not None:
             yield Dependence.VELOCITY, smooth([each.rate_rad_s[:, place.joint] for each in own])
             yield Dependence.ACCELERATION, smooth([each.acceleration_rad_s2[:, place.joint] for each in own])
+            if self.traces[0].link.of_joints:  # behind the arm's modes a jerk is no function any more
+                yield Dependence.JERK, free([each.jerk(place.joint) for each in own])
             return
         velocity = [each.velocity_mm_s for each in own]
         speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]

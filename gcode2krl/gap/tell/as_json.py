@@ -10,7 +10,9 @@ from gcode2krl.errors import Issue
 from gcode2krl.gap.choose.intervals import Interval
 
 SCHEMA = "gcode2krl/gap/1"
-_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats"})
+_NAMES = {"source": "from"}
+"""Names of the contract that Python keeps for itself."""
+_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats", "moment"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 
@@ -23,6 +25,7 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "at_part": plain(gap.at_part),
         "links": plain(gap.links),
         "where": plain(gap.where),
+        "events": plain(gap.events),
         "causes": plain(gap.causes),
         "unexplained": plain(gap.unexplained),
         "not_examined": plain(gap.not_examined),
@@ -51,7 +54,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Interval):
         value = value._asdict()
     if is_dataclass(value):
-        value = {name: each for name, each in _items(value) if not _is_left_out(name, each)}
+        value = {_NAMES.get(name, name): each for name, each in _items(value) if not _is_left_out(name, each)}
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):

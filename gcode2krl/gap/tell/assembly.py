@@ -16,7 +16,9 @@ from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.dependences import depends_on
+from gcode2krl.gap.tell.events import IMPULSE, events_of, impulses_of
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
+from gcode2krl.gap.tell.instruments import issues_of, noise_of, readings_of_noise
 from gcode2krl.gap.tell.next_run import next_run_of
 from gcode2krl.gap.tell.part_size import at_part, at_part_of
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
@@ -54,19 +56,22 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         gap=_size(_with_largest_gap(judgements, largest), slips),
         links=tuple(_links(judgements, slips)),
         at_part=_at_part(judgements, slips, residuals),
+        events=tuple(event for judgement in signals for event in events_of(judgement)),
         where=_where(largest, judgements, of_largest),
-        causes=_causes(judgements, slips),
+        causes=_causes(judgements, slips, context.pairs),
         unexplained=unexplained,
         not_examined=tuple(_not_examined(judgements, slips)),
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
-        next_run=next_run_of(context, signals, unexplained.depends_on),
+        next_run=next_run_of(
+            context, signals, [each for each in unexplained.depends_on if each.form != IMPULSE]
+        ),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
         ),
-        issues=(*issues, *_issues_of_runs(context.pairs)),
+        issues=(*issues, *_issues_of_runs(context.pairs), *issues_of(signals)),
         runs=tuple(pair.name for pair in context.pairs),
         notes=tuple(_notes(context.pairs, signals)),
         evidence=None
@@ -176,7 +181,7 @@ def _timing(path: Judgement) -> LinkResult:
         link=TIMING.name,
         rms_before=before_s,
         rms_after=after_s,
-        noise=None,
+        floor=None,
         unit=TIMING.unit,
         verdict=path.verdict if _is_timing(path) else "no_gap",
     )
@@ -190,7 +195,8 @@ def _link(judgement: Judged, slipped: bool) -> LinkResult:
         link=judgement.link.name,
         rms_before=factor * size.before**0.5,
         rms_after=factor * size.after**0.5,
-        noise=factor * size.floor**0.5,
+        floor=factor * size.floor**0.5,
+        noise=noise_of(judgement) if isinstance(judgement, Judgement) else None,
         unit=judgement.link.unit,
         verdict="explained" if slipped and verdict == "no_gap" else verdict,
         offset_deg=_zeros_deg(judgement) if isinstance(judgement, Judgement) else None,
@@ -223,12 +229,15 @@ def _where(largest: Judgement | None, judgements: Sequence[Judged], residuals: S
     return replace(place(traces, shapes, residuals[0].noise, largest.applied), signals=signals)
 
 
-def _causes(judgements: Sequence[Judged], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
+def _causes(
+    judgements: Sequence[Judged], slips: Sequence[Slip], pairs: Sequence[Pair]
+) -> tuple[CauseResult, ...]:
     """Return the causes of all links, the most probable first."""
     causes = [slip_cause(slip) for slip in slips]
     for judgement in judgements:
         causes += [
-            cause_of(cause, judgement, _reported_in(cause, judgement).name) for cause in judgement.reported
+            cause_of(cause, judgement, _reported_in(cause, judgement).name, pairs)
+            for cause in judgement.reported
         ]
     return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
@@ -245,6 +254,7 @@ def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -
         return Unexplained(rms=None, significant=False, structure="unknown")
     families: list[DependsOnResult] = []
     for judgement in sorted(signals, key=_weight, reverse=True):
+        families += impulses_of(judgement)
         families += depends_on(judgement, larger_links=len({each.link for each in families}))
     size = largest.told
     left = bool(size.significant) and largest.verdict != "explained"
@@ -292,3 +302,4 @@ def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[s
     for judgement in judgements:
         for trace in judgement.traces:
             yield from (f"{judgement.link.name}, {trace.run}: {what} left out" for what in trace.left_out)
+    yield from readings_of_noise(judgements)

@@ -6,6 +6,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.beside.events import line_at
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.choose.likely_families import FamilyProbability, family_probabilities
 from gcode2krl.gap.families.evidence import Evidence
@@ -62,6 +63,7 @@ def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
         tests=told.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
         run=None if moment is None else judgement.every[moment[0]].run,
+        line=None if moment is None else line_at(judgement.every[moment[0]].inputs, moment[1]),
         size=judgement.factor * float(np.linalg.norm(largest)),
         unit=judgement.link.unit,
         direction=tuple((along / length).tolist()) if is_vector and length > 0.0 else None,

@@ -3,8 +3,17 @@
 import math
 from collections.abc import Sequence
 
-from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult, PhaseResult
-from gcode2krl.gap.tell.words import describe, listed, named, rounded, what_there_is
+from gcode2krl.gap.tell.events import IMPULSE
+from gcode2krl.gap.tell.result import (
+    AtPart,
+    CauseResult,
+    EventResult,
+    Gap,
+    IntervalResult,
+    MomentResult,
+    PhaseResult,
+)
+from gcode2krl.gap.tell.words import describe, listed, named, number, rounded, unit_of, what_there_is
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -33,7 +42,52 @@ def headline(gap: Gap) -> str:
         return f"Set-up slip: {slip.words}."
     if gap.verdict == "no_gap":
         return _no_gap(gap)
-    return " ".join(filter(None, (f"{_off(gap)}{_mostly(gap)}: {_why(gap)}.", _left(gap))))
+    hit = _hit(gap)
+    if hit and not gap.causes and all(each.form == IMPULSE for each in gap.unexplained.depends_on):
+        return f"{hit}. What else the runs differ by, noise and normal mismatch explain."
+    usual = " ".join(filter(None, (f"{_off(gap)}{_mostly(gap)}: {_why(gap)}.", _left(gap))))
+    return f"{hit}. {usual}" if hit else usual
+
+
+def _hit(gap: Gap) -> str:
+    """Return what happened in a moment, and what it left behind; nothing where nothing did.
+
+    What a force sensor and the tip, or a joint from then on, show at once was a blow; one reading alone may
+    be one of its instrument.
+    """
+    impulses = [each for each in gap.events if each.what == IMPULSE]
+    event = max(impulses, key=lambda each: (each.link == "force", each.size), default=None)
+    if event is None:
+        return ""
+    step = next((cause for cause in gap.named_causes if _is_at(cause.moment, event)), None)
+    at = f"at {event.t_s:.2f} s of {event.run}, line {event.line}"
+    others = [each for each in gap.events if each.what != "burst" and each.link != event.link]
+    together = [each for each in others if each.run == event.run and _is_near(each.t_s, event.t_s)]
+    if event.link == "force" and (step or together):
+        said = f"The tool hit something {at}: {_force(event.size)}"
+    else:
+        where = "force" if event.link == "force" else f"{event.link} signal"
+        size = _force(event.size) if event.unit == "N" else amount(event.size, event.unit)
+        said = f"The {where} jumps {at}, for {amount(max(event.lasts_s, 1e-3), 's')}: {size}"
+    if step is None:
+        return said
+    name = next((name for name in step.parameters if name.startswith("size_")), None)
+    if name is None:
+        return said
+    off = f"{number(abs(step.parameters[name].value))} {unit_of(name)[1]}"
+    return f"{said}; since then {'the tip' if step.target == 'tip' else step.target} is off by {off}"
+
+
+def _is_at(moment: MomentResult | None, event: EventResult) -> bool:
+    return moment is not None and moment.run == event.run and _is_near(moment.t_s, event.t_s)
+
+
+def _is_near(one_s: float, other_s: float) -> bool:
+    return abs(one_s - other_s) < _LIMITS.same_moment_s
+
+
+def _force(size_N: float) -> str:
+    return f"{rounded(size_N / 1000.0)} kN" if size_N >= 1000.0 else f"{rounded(size_N)} N"
 
 
 def _no_gap(gap: Gap) -> str:

@@ -82,7 +82,7 @@ def left_lines(gap: Gap) -> Iterator[str]:
 def _link(link: LinkResult) -> str:
     return (
         f"{link.link:<11} {number(link.rms_before):<11} {number(link.rms_after):<11} "
-        f"{number(link.noise):<11} {link.verdict} ({link.unit})"
+        f"{number(link.floor):<11} {link.verdict} ({link.unit})"
     )
 
 

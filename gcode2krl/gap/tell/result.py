@@ -53,16 +53,50 @@ class AtPart:
 
 
 @dataclass(frozen=True, kw_only=True)
+class NoiseResult:
+    """The noise of a link's instrument: rms over its components of their standard deviations."""
+
+    stated: float | None
+    """As run.toml states it."""
+    learnt: float
+    """What noise was taken to be, with what it forgets within seconds."""
+    short: float
+    """What of it is forgotten within milliseconds: the other reading, where nothing else is known."""
+    source: str
+    """In the JSON object ``from``: repeats, or each run by itself."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventResult:
+    """What was rough or far off for a moment."""
+
+    link: str
+    run: str
+    t_s: float
+    line: int
+    """Of the G-code; 0 where the robot is on none."""
+    what: str
+    """impulse, slip, or burst: the instrument's, left out."""
+    size: float
+    """The largest deviation from the level around it, of a slip the change that stays."""
+    unit: str
+    lasts_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class LinkResult:
     """One examined link."""
 
     link: str
     rms_before: float
     rms_after: float
-    noise: float | None
+    floor: float | None
+    """Length of noise and normal mismatch together."""
     unit: str
     verdict: str
     """no_gap, explained, partly_explained or unexplained."""
+    noise: NoiseResult | None = None
+    """None where nothing measures it, or nothing was learnt."""
     offset_deg: Mapping[str, float] | None = None
     """Joint -> zero between its two encoders, where the link has two."""
 
@@ -157,13 +191,15 @@ class DependsOnResult:
     on: str
     """An input: the value of an `effects.dependence.Dependence`, "time in the run" for a step too."""
     form: str
-    """step, drift, periodic, loop or smooth."""
+    """impulse, step, drift, periodic, loop or smooth."""
     probability: float
     share: float
     """Of the gap's power beyond noise that it takes."""
     at_time_s: float | None = None
-    """Of a step, its moment in `run`."""
+    """Of a step or an impulse, its moment in `run`."""
     run: str | None = None
+    line: int | None = None
+    """Of the G-code, at that moment."""
     size: float | None = None
     """Of a step its height, else the largest deviation, in ``unit``."""
     unit: str | None = None
@@ -202,6 +238,16 @@ class NextRun:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MomentResult:
+    """A moment of a run."""
+
+    run: str
+    t_s: float
+    line: int
+    """Of the G-code."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CauseResult:
     """One effect at one target, a set-up slip included."""
 
@@ -229,6 +275,8 @@ class CauseResult:
     constant: Constancy | None = None
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`choose.features.Features`); None where not tested."""
+    moment: MomentResult | None = None
+    """Of what begins at a moment: where that is in its run."""
 
     @property
     def is_named(self) -> bool:
@@ -294,6 +342,8 @@ class Gap:
     notes: tuple[str, ...] = ()
     at_part: AtPart | None = None
     """None where there is no gap, or nothing to compare."""
+    events: tuple[EventResult, ...] = ()
+    """What happened in a moment of one run, in the order of links and runs."""
     evidence: Evidence | None = field(default=None, repr=False, compare=False)
     """What the pictures are drawn from; not in the JSON object."""
 

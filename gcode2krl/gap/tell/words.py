@@ -85,7 +85,10 @@ def describe(cause: CauseResult, most: int | None = None) -> str:
 
     Components of a vector stand in brackets; where there are more than ``most`` numbers none is given.
     """
-    numbers = _numbers(cause.parameters)
+    moment = cause.moment
+    numbers = _numbers({k: v for k, v in cause.parameters.items() if moment is None or k != "at_s"})
+    if moment is not None:
+        numbers.insert(0, f"at {moment.t_s:.2f} s of {moment.run}, line {moment.line}")
     if most is not None and len(numbers) > most:
         numbers = []
     return ", ".join([named(cause.effect, cause.target), *numbers])
@@ -150,9 +153,11 @@ def _place(found: DependsOnResult) -> str:
 
 
 def _form(found: DependsOnResult) -> str:
-    if found.form == "step" and found.at_time_s is not None:
-        run = f" of {found.run} and all later runs" if found.run else ""
-        return f"a step at {found.at_time_s:.1f} s{run}"
+    if found.form in ("step", "impulse") and found.at_time_s is not None:
+        line = f", line {found.line}" if found.line else ""
+        later = " and all later runs" if found.form == "step" else ""
+        run = f" of {found.run}{line}{later}" if found.run else ""
+        return f"{'a' if found.form == 'step' else 'an'} {found.form} at {found.at_time_s:.1f} s{run}"
     return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
 
 

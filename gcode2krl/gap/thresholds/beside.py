@@ -77,6 +77,29 @@ class BesideThresholds:
     bursts_most: float = convention(
         0.15, "share of a component's rows up to which bursts are left out: more is how the signal is"
     )
+    pulse_around_s: float = convention(0.4, "around a pulse: the level it leaves and comes back to")
+    pulse_widths_s: tuple[float, ...] = convention(
+        (0.02, 0.05, 0.1), "of pulses that are looked for: blows and snags take 20 to 100 ms"
+    )
+    pulse_deviations: float = calibrated(
+        12.0, DEVELOPMENT, "robust deviations of a pulse; one in 1600 signals of tails, bursts and slow noise"
+    )
+    event_apart_s: float = convention(0.1, "rough rows that are nearer to each other are one event")
+    command_share: float = convention(
+        0.1, "of the largest commanded jerk: from here on a signal may be rough in step with it"
+    )
+    command_lasts_s: float = physics(
+        0.15, "after a jerk, a reversal or a jump of the force until servo and arm are calm"
+    )
+    in_step_p: float = convention(
+        0.01, "chance that so many events fall where the command, or another table, changes"
+    )
+    in_step_least: int = convention(3, "events by which the command tells: two are a coincidence")
+    change_level_s: float = convention(0.4, "before and after an event, over which its level is the median")
+    change_deviations: float = convention(
+        8.0, "robust deviations of that level elsewhere in the run, beyond which a change stays"
+    )
+    same_place_s: float = convention(0.05, "repeats and tables show one event within this")
     hum_least_rows: int = convention(500, "fewer rows tell no line of a spectrum from its surroundings")
     hum_wander_hz: float = physics(0.1, "a grid keeps its frequency to 20 mHz, its fifth multiple to 0.1")
     hum_around_hz: float = convention(2.0, "beside a line of the mains the level of the noise is looked for")

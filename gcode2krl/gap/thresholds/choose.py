@@ -79,9 +79,6 @@ class ChooseThresholds:
     modelled_freedom: float = convention(
         10.0, "degrees of freedom that the scatter by the noise's model has beside that between stretches"
     )
-    significant_share: float = calibrated(
-        0.1, DEVELOPMENT, "excess power below this share of the noise's is within what its model is sure of"
-    )
     least_spread: float = convention(
         0.1, "of the mean over the root of the count: the least standard deviation of a mean square"
     )

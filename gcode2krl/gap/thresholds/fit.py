@@ -21,8 +21,8 @@ class FitThresholds:
     )
     noise_least_stated: float = convention(0.9, "of what run.toml states: noise is never taken to be less")
     noise_most_stated: float = convention(
-        2.5,
-        "times what run.toml states: a data sheet states the best; heavy tails of twice that come beside it",
+        1.4,
+        "times what run.toml states: a data sheet states the best; more than that is a finding, not noise",
     )
 
     noise_most_lines: int = convention(8, "tones of one signal that are taken off before its noise is learnt")
