@@ -24,7 +24,7 @@ import numpy as np
 
 from gcode2krl import plan_motion, predict, read_gcode, solve_joints
 from gcode2krl.cell import Cell, resolve_cell
-from gcode2krl.errors import Issue
+from gcode2krl.errors import Issue, NotUnderstoodError
 from gcode2krl.pipeline import targets_and_joints
 
 KINDS = {
@@ -438,10 +438,10 @@ def cases(kind: str, count: int, is_clean: bool) -> Iterator[tuple[str, str]]:
     while done < count:
         rng = np.random.default_rng(next(seed))
         with tempfile.TemporaryDirectory() as folder:
-            case = drawn(kind, rng, Path(folder), is_clean)
             try:
+                case = drawn(kind, rng, Path(folder), is_clean)
                 tracks = tracks_of(case.part, case.cell)
-            except ValueError:
+            except (ValueError, NotUnderstoodError):  # out of reach, or a cell that contradicts itself
                 continue
             if any(np.isnan(track.q_rad).any() for track in tracks) or cut_into(case, tracks):
                 continue

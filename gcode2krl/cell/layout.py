@@ -246,7 +246,9 @@ def _behind_plane(cell: Cell, obstacle: Obstacle, key: str, stock: Box | None) -
         there = frame[:3, :3] @ point + frame[:3, 3]
         if (there - obstacle.plane.point_mm) @ np.array(obstacle.plane.normal) < 0.0:
             text = f"{obstacle.name}: {what} stands on its solid side; the normal points to the free side"
-            yield _wrong("error", f"{key}.plane", text)
+            # A fence ends somewhere; the plane that stands for it does not: a doubt, no error.
+            severity: Severity = "warning" if what == "the robot" else "error"
+            yield _wrong(severity, f"{key}.plane", text)
             return
 
 

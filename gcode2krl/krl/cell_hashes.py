@@ -35,7 +35,10 @@ _OPTIONS = "options"
 """The entry for the lines of options and released findings, which `verify` takes from the header."""
 _RELEASED = re.compile(r"([a-z0-9-]+(?::(?:[^:]+:)?[0-9]{1,9})?)(?: \(whole file, ([0-9]{1,9})\))?(?:, |$)")
 """A release in the header, and for how many findings it was."""
-_REMEDY = "look at what it would do with the cell as it is, and translate again"
+_REMEDY = (
+    "look at what it would do with the cell as it is, and translate again; "
+    "verify with --job what was made with it"
+)
 
 
 def hashes_of_sections(cell: Cell, tools: Iterable[int]) -> dict[str, str]:

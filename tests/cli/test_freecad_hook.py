@@ -108,7 +108,7 @@ def test_one_post_call_makes_the_program(post, run):
     assert (
         np.abs(prediction.forces.force_base_N[drilled, 2]).max() > 50.0
     )  # the holes are cut, not passed over
-    verified = run("verify", source, handed / "part.nc", "--cell", cell)
+    verified = run("verify", source, handed / "part.nc", "--job", handed / "job.toml", "--cell", cell)
     assert verified.code == 0, verified.err
 
 

@@ -54,7 +54,8 @@ def ready(folder, run):  # noqa: F811
             text = answers.read_text(encoding="utf-8")
             (folder / "answers.toml").write_text(text, encoding="utf-8")
         if "verify" in line or "runkit" in line:
-            assert run("part.nc", "--cell", "cell.toml", "-o", "part.src").code == 0
+            cell = ("--cell", "cell.toml") if "--cell" in line else ()  # that of the program
+            assert run("part.nc", *cell, "-o", "part.src").code == 0
         if "report" in line:
             assert run("predict", "part.nc", "--cell", "cell.toml", "-o", "prediction").code == 0
         if "identify force" in line:

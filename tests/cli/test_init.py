@@ -307,7 +307,7 @@ def test_an_archive_of_another_arm_is_refused(run, tmp_path):
 def test_what_is_cleared_at_the_terminal_is_left_out(tmp_path):
     controller = read_controller(archive_of(tmp_path / "archive.zip", "tool_magazine"))
     words = keys(answers_of("tool_magazine"), controller)
-    words[3] = "\x15" + ENTER
+    words[4] = "\x15" + ENTER
     assert "home" not in completed(typed(words, controller), controller)
 
 

@@ -128,7 +128,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name == "rail" else []) for name in CASES]
+)
 def test_an_example_with_its_own_cell_agrees(run, tmp_path, name):
     part, cell, options, stated = CASES[name]
     nc, src = tmp_path / "part.nc", tmp_path / "made.src"

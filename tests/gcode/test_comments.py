@@ -331,6 +331,7 @@ def reference_programs():
     return programs()
 
 
+@pytest.mark.slow
 def test_comments_in_all_lines_of_all_programs_change_nothing(reference_programs):
     assert sum(map(check_all_lines_at_once, reference_programs)) > 20_000
 

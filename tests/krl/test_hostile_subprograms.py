@@ -252,7 +252,7 @@ def assert_none_wrong(first: int, count: int, folder) -> None:
 
 
 def test_no_wrong_target_amid_hostile_subprograms(tmp_path):
-    assert_none_wrong(0, 25, tmp_path)
+    assert_none_wrong(0, 12, tmp_path)
 
 
 @pytest.mark.slow
