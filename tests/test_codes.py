@@ -120,6 +120,7 @@ def _stated_severities() -> Iterator[tuple[str, str, str]]:
                 yield from ((code, "error", f"{file.name}:{call.lineno}") for code in words[0])
 
 
+@pytest.mark.slow
 def test_every_code_of_the_source_is_in_the_table() -> None:
     used = _used()
     assert len(used) > 200

@@ -100,11 +100,13 @@ def test_an_unknown_name_is_an_attribute_error():
         _ = gcode2krl.predictions
 
 
+@pytest.mark.slow
 def test_no_function_has_the_name_of_its_module():
     shared = [dotted for dotted, tree in modules() if dotted.split(".")[-1] in defined(tree)]
     assert shared == sorted(STILL_SHARED)
 
 
+@pytest.mark.slow
 def test_no_package_exports_a_name_that_a_module_of_its_has():
     """`from package import name` would mean one or the other, by what was imported first."""
     shared = []

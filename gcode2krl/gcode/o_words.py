@@ -102,6 +102,8 @@ class _Open:
         self.continues: list[int] = []
         self.unread: int | None = None
         """The first row inside that makes no sense."""
+        self.end_unread = False
+        """An O-line inside makes no sense: it may have been the end."""
 
 
 class Flow:
@@ -120,7 +122,7 @@ class Flow:
         self.lines["expression"][row] = self.lines["start"][row] + line.behind
         if line.word == "(":
             self._fault(row, faults.FAULT_NOT_FIRST)
-            self.add_refused(row)
+            self.add_refused(row, is_o_line=True)
             return
         handler = getattr(self, f"_{line.word}", None) if line.word else None
         if handler is None:
@@ -133,10 +135,11 @@ class Flow:
         else:
             handler(row, line.label)
 
-    def add_refused(self, row: int) -> None:
+    def add_refused(self, row: int, *, is_o_line: bool) -> None:
         """Take a line that is refused even where it is passed over: whatever it stands in leads there."""
         for each in self._open:
             each.unread = row if each.unread is None else each.unread
+            each.end_unread |= is_o_line
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
@@ -159,6 +162,7 @@ class Flow:
             if each.word == "sub":
                 break
             each.unread = row if each.unread is None else each.unread
+            each.end_unread = True
 
     def _lead_to_unread(self, closed: _Open) -> None:
         """Let what has a line inside that makes no sense lead there, so that it is reported."""
@@ -187,7 +191,8 @@ class Flow:
         for each in self._open[depth:]:
             if self.lines["kind"][each.row] != tables.KIND_FAULT:
                 self._fault(each.row, faults.FAULT_NO_CLOSING)
-            self._lead_to_unread(each)
+            if each.end_unread:
+                self._lead_to_unread(each)
         del self._open[depth:]
 
     def _set_jumps(self, rows: list[int], target: int) -> None:

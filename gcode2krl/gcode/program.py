@@ -160,7 +160,7 @@ class Program:
             if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
             elif self._lines["fault"][row] != f.OK:
-                flow.add_refused(row)
+                flow.add_refused(row, is_o_line=bool(parsed(content).label))
             else:
                 flow.add(row, parsed(content))
         flow.finish()

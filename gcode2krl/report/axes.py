@@ -6,15 +6,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, look, title
+from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import Toolpath
 
 _VIEWS = ((0, 1, "From above"), (0, 2, "From the front"), (1, 2, "From the right"))
-_TOOLS = 120
-"""So many tools are drawn, evenly along the feed moves."""
-_LENGTH = 0.14
-"""Length of a drawn tool, as a fraction of the largest extent of the feed moves."""
 _TOOL_WIDTH = 0.9
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -26,22 +23,16 @@ def axes_figure(toolpath: Toolpath, stock_mm: Box | None, table_mm: float | None
     ``stock_mm`` are the corners of the raw part, ``table_mm`` the height of the table, each None where it is
     not stated. A tool whose axis points below the horizon is red.
     """
-    place = toolpath.known.all(axis=1) & ~toolpath.machine
-    place[0] = False
-    feed = place & ~toolpath.rapid
-    shown = feed if feed.any() else place
+    tools = drawn_tools(toolpath)
     tips = toolpath.position_mm
-    extent_mm = max(float(np.ptp(tips[shown], axis=0).max()), 1.0) if shown.any() else 1.0
-    rows = _evenly(tips, shown)
-    ends = np.stack([tips[rows], tips[rows] + _LENGTH * extent_mm * toolpath.axis[rows]], axis=1)
     with look():
         figure = Figure(figsize=(12.0, 5.2), layout="constrained")
         for at, (across, up, name) in enumerate(_VIEWS, start=1):
             axes = figure.add_subplot(1, 3, at)
             _draw_place(axes, across, up, stock_mm, table_mm)
-            _draw_tips(axes, tips[:, [across, up]], place, feed)
-            lines = ends[:, :, [across, up]]
-            colours = np.where(toolpath.axis[rows, 2] < -1e-6, VERMILION, ORANGE)
+            _draw_tips(axes, tips[:, [across, up]], tools.has_place, tools.is_feed)
+            lines = tools.ends_mm[:, :, [across, up]]
+            colours = np.where(toolpath.axis[tools.rows, 2] < -1e-6, VERMILION, ORANGE)
             axes.add_collection(LineCollection(list(lines), colors=colours, linewidths=_TOOL_WIDTH, zorder=4))
             axes.plot(*lines[:, 0].T, ".", color=BLACK, ms=2.5, zorder=5, label="tips of the tools drawn")
             axes.plot([], [], color=ORANGE, lw=_TOOL_WIDTH, label="tool, from tip towards holder")
@@ -55,15 +46,6 @@ def axes_figure(toolpath: Toolpath, stock_mm: Box | None, table_mm: float | None
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         figure.suptitle(title("Tip and tool axis", toolpath))
     return figure
-
-
-def _evenly(tips: Floats, shown: Bools) -> Ints:
-    """Return rows that are evenly spread along the way of those that are shown."""
-    rows = np.flatnonzero(shown)
-    if len(rows) <= _TOOLS:
-        return rows
-    way_mm = np.cumsum(np.linalg.norm(np.diff(tips[rows], axis=0, prepend=tips[rows[:1]]), axis=1))
-    return np.unique(rows[np.searchsorted(way_mm, np.linspace(0.0, way_mm[-1], _TOOLS))])
 
 
 def _draw_place(axes: Axes, across: int, up: int, stock_mm: Box | None, table_mm: float | None) -> None:

@@ -37,6 +37,7 @@ def drive(device, session, log, krc, cycles, changed, load=ramp):
     return session
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("through", [2, 3, 5])
 def test_a_network_that_loses_answers_makes_no_step_at_the_robot(cell, device, settings, through):
     """Telegrams come, but only each second, third, fifth answer gets through."""
@@ -73,6 +74,7 @@ def test_a_second_controller_on_the_same_line(cell, device, settings):
     check(log, settings)
 
 
+@pytest.mark.slow
 def test_a_controller_that_contradicts_itself(cell, device, settings):
     """POSCORRMON comes and goes, with any sign, while RIst says 5 mm."""
     session, log = proven(device, krc := Krc(cell, stands_s=0.4))

@@ -39,6 +39,7 @@ def told(device, krc, cycles, changed):
     return session, log
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mm", "cycles"), [(4.0, 3), (6.0, 4), (6.0, 200), (-40.0, 200)])
 def test_a_robot_that_is_seen_too_far_away_is_held_where_it_is(cell, device, settings, mm, cycles):
     session, log = told(device, Krc(cell, stands_s=0.4), 200, apart(mm, 20, cycles))
@@ -73,6 +74,7 @@ def test_a_robot_that_goes_on_moving_away_gets_no_answer_any_more(cell, device, 
     check(log, settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [False, True])
 @pytest.mark.parametrize("lost", [10, 100])
 def test_a_robot_that_was_started_anew_is_not_sent_the_old_correction(cell, axis, lost):

@@ -21,7 +21,7 @@ AXES = {
     "E5": {"kind": "rail", "axis": "x", "limits": [-500.0, 500.0]},
 }
 CELL = over_demonstration({"external": AXES, "frames": {"base": BASE, "robroot": ROOT}})
-COUNT = 10_000
+COUNT = 1_000
 
 
 def frame(six):

@@ -29,6 +29,7 @@ from gcode2krl.report.page.losses import (
 from gcode2krl.report.page.passes import passes_of
 from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
+from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
@@ -126,7 +127,7 @@ def content_of(
     made = _content(
         _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
     )
-    made = _with_meshes(made, meshes_mm or {})
+    made = _with_meshes(_with_tool_axes(made, prediction.toolpath), meshes_mm or {})
     return made if nominal is None else _with_nominal(made, nominal, whole)
 
 
@@ -144,8 +145,9 @@ def content_of_refused(
     found = tuple(issues)
     rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M if cell is not None else None
     whole = samples_of_path(toolpath, rapid_mm_s) if toolpath is not None else None
-    if whole is not None and len(whole) > 1:
-        return _content(title, verdict, whole, found, cell, text, stock_mm, [])
+    if toolpath is not None and whole is not None and len(whole) > 1:
+        made = _content(title, verdict, whole, found, cell, text, stock_mm, [])
+        return _with_tool_axes(made, toolpath)
     shown = told(found)
     return Content(
         title=title,
@@ -208,6 +210,14 @@ def _content(
         data=data,
         text=packed_text(text or ""),
     )
+
+
+def _with_tool_axes(content: Content, toolpath: Toolpath) -> Content:
+    """Return a page with the tool along the path, where the tool ever leans."""
+    tools = drawn_tools(toolpath)
+    if not (np.abs(toolpath.axis[tools.rows] - (0.0, 0.0, 1.0)) > 1e-6).any():
+        return content
+    return replace(content, head=content.head | {"axes": np.round(tools.ends_mm, 3).tolist()})
 
 
 def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:

@@ -46,6 +46,10 @@ class Page {
       this.stock = stockBox(head.stock);
       scene.scene.add(this.stock);
     }
+    if (head.axes) {
+      this.axes = toolAxes(head.axes);
+      scene.scene.add(this.axes);
+    }
     if (head.robot) {
       this.robot = new Robot(head.robot, this.columns, head.near, this.meshes);
       this.robot.wanted = true;
@@ -244,6 +248,7 @@ class Page {
     byId("colour").addEventListener("change", () => this.paint());
     byId("show-rapids").addEventListener("change", () => this.paint());
     byId("show-stock").addEventListener("change", (event) => { this.stock.visible = event.target.checked; this.scene.changed(false); });
+    byId("show-axes")?.addEventListener("change", (event) => { this.axes.visible = event.target.checked; this.scene.changed(false); });
     byId("show-solids")?.addEventListener("change", (event) => { this.solids.visible = event.target.checked; this.scene.changed(false); });
     byId("show-cell").addEventListener("change", (event) => { this.robot.obstacles.visible = event.target.checked; this.scene.changed(false); });
     byId("show-robot").addEventListener("change", (event) => {

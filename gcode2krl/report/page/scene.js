@@ -257,6 +257,17 @@ function axesAt(extent) {
   return group;
 }
 
+// The tool from tip towards holder along the path; red where it points from below the horizon.
+function toolAxes(ends) {
+  const colour = ([tip, end]) => new THREE.Color(end[2] < tip[2] - 1e-6 ? "#d55e00" : "#e69f00").toArray();
+  const lines = new THREE.BufferGeometry();
+  lines.setAttribute("position", new THREE.Float32BufferAttribute(ends.flat(2), 3));
+  lines.setAttribute("color", new THREE.Float32BufferAttribute(ends.flatMap((one) => [...colour(one), ...colour(one)]), 3));
+  const mesh = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true, depthTest: false }));
+  mesh.renderOrder = 3;
+  return mesh;
+}
+
 function rendererName() {
   const gl = document.createElement("canvas").getContext("webgl2");
   if (!gl) return "";

@@ -154,3 +154,16 @@ def test_a_module_becomes_a_constant():
 def test_figures_and_code():
     assert [figure(value) for value in (1234.5, 12.345, 1.2345)] == ["1234", "12.3", "1.23"]
     assert coded("say `a < b`") == "say <code>a &lt; b</code>"
+
+
+def test_the_tool_is_drawn_where_it_leans(text):
+    folder = ROOT / "examples" / "five_axis"
+    leaning = predict(folder / "five_axis.nc", load_cell(folder / "cell.toml"), forces=False)
+    made = page(content_of(leaning))
+    ends = np.array(head_of(made)["axes"])
+    assert ends.shape[1:] == (2, 3)
+    directions = np.unique(np.round((ends[:, 1] - ends[:, 0])[:, :2], 2), axis=0)
+    assert len(directions) > 20  # the swarf cut turns the tool all the way round
+    assert 'id="show-axes"' in made
+    assert 'id="show-axes"' not in text
+    assert "axes" not in head_of(text)
