@@ -102,6 +102,16 @@ def test_what_every_repeat_has_at_the_same_place_stays():
     assert kinds(sorted_out(apart, {})) == [Whose.INSTRUMENT] * 3
 
 
+def test_a_pulse_that_repeats_have_smaller_is_no_blow():
+    """In one run it passes the limit of pulses, in the others it does not."""
+    inputs = stop_and_go()
+    smaller = [noise(COUNT, seed)[:, 0] + blow(7.2, height) for seed, height in ((8, 60.0), (9, 0.0))]
+    assert Whose.IMPULSE in kinds(sorted_out(runs(*smaller, inputs=inputs), {}))
+    smaller[1] = smaller[1] + blow(7.2, 36.0)
+    traces = runs(*smaller, inputs=inputs)
+    assert sorted_out(traces, {}) == traces
+
+
 def test_a_blow_is_an_impulse_with_moment_and_size():
     (found,) = sorted_out(runs(noise(COUNT, 8)[:, 0] + blow(7.2)), {})
     (event,) = found.events

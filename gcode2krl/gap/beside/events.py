@@ -29,6 +29,7 @@ from gcode2krl.gap.beside.admissible import Admissible
 from gcode2krl.gap.beside.bursts import loud_rows
 from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.holdout import with_rows
+from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pulses import pulse_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -102,7 +103,7 @@ def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]])
     if not any(stretches):
         return list(traces)
     commanded = _in_step(traces, stretches, [_command_changes(trace) for trace in traces])
-    repeated = [_repeated(traces, stretches, number) for number in range(len(traces))]
+    repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
     shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
     coincident = _in_step(traces, stretches, shared, least=1)
     return [
@@ -274,8 +275,16 @@ def _last_before(at_s: Floats, time_s: Floats) -> Floats:
     return last
 
 
-def _repeated(traces: Sequence[Trace], stretches: Sequence[Sequence[_Stretch]], number: int) -> list[bool]:
-    """Return which stretches of a trace every other run of the same program has too, at the same time."""
+def _repeated(
+    traces: Sequence[Trace],
+    rests: Sequence[Floats],
+    stretches: Sequence[Sequence[_Stretch]],
+    number: int,
+) -> list[bool]:
+    """Return which stretches of a trace every other run of the same program has too, at the same time.
+
+    Rough ones where the others are rough; pulses also where the others do the same, too small to be pulses.
+    """
     trace = traces[number]
     repeats = [i for i, other in enumerate(traces) if i != number and _is_repeat(trace, other)]
     if not repeats:
@@ -287,10 +296,26 @@ def _repeated(traces: Sequence[Trace], stretches: Sequence[Sequence[_Stretch]], 
     everywhere = np.all(others, axis=0)
     # where all are rough most of the time that says nothing
     if float(np.mean(everywhere)) > _LIMITS.bursts_most:
-        return [False] * len(stretches[number])
+        everywhere[:] = False
+    again = [linear(trace.time_s, traces[i].time_s, rests[i]) for i in repeats]
     return [
-        bool(everywhere[each.first : each.last].any()) and not _is_outlier(each) for each in stretches[number]
+        not _is_outlier(each)
+        and (bool(everywhere[each.first : each.last].any()) or _is_in_all(each, rests[number], again))
+        for each in stretches[number]
     ]
+
+
+def _is_in_all(stretch: _Stretch, rest: Floats, again: Sequence[Floats]) -> bool:
+    """Tell whether a pulse of a rest (n, k) is in all other ones (n, k) by half of its height at least."""
+    if not stretch.is_pulse:
+        return False
+    # between the rows before and behind it, so that a level of each run's own says nothing
+    rows = np.arange(max(stretch.first - 1, 0), min(stretch.last + 1, len(rest)))
+    share = np.linspace(0.0, 1.0, len(rows))[:, None]
+    own, *others = (
+        values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (rest, *again)
+    )
+    return all(float(np.sum(own * each)) > 0.5 * float(np.sum(own**2)) for each in others)
 
 
 def _is_repeat(one: Trace, other: Trace) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csc_array, identity
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
@@ -145,9 +146,9 @@ class _Explained:
         self._width = width
         t = trace.time_s
         count = max(2, round((t[-1] - t[0]) / _LIMITS.noise_slow_s) + 1)
-        knots = np.linspace(t[0], t[-1], count)
-        self.hats = np.maximum(0.0, 1.0 - np.abs(t[:, None] - knots) / (knots[1] - knots[0]))
-        self.hats_gram = self.hats.T @ self.hats + _HATS_RIDGE * len(t) * np.eye(count)
+        self._hats = _hats(t, np.linspace(t[0], t[-1], count))
+        ridge = _HATS_RIDGE * len(t) * identity(count)
+        self._hats_gram = csc_array(self._hats.T @ self._hats + ridge)
 
     def off(self, values: Floats) -> Floats:
         """Return values (n, k) without what effects and nuisance explain."""
@@ -164,8 +165,20 @@ class _Explained:
 
     def fast(self, values: Floats) -> Floats:
         """Return values (n, k) without what is slower than half a second."""
-        quick: Floats = values - self.hats @ np.linalg.solve(self.hats_gram, self.hats.T @ values)
+        from scipy.sparse.linalg import splu
+
+        quick: Floats = values - self._hats @ splu(self._hats_gram).solve(self._hats.T @ values)
         return quick
+
+
+def _hats(time_s: Floats, knots_s: Floats) -> csc_array:
+    """Return hats over time (n, knots), of which each row has two."""
+    apart_s = knots_s[1] - knots_s[0]
+    before = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
+    share = (time_s - knots_s[before]) / apart_s
+    rows = np.arange(len(time_s))
+    values, columns = np.concatenate([1.0 - share, share]), np.concatenate([before, before + 1])
+    return csc_array((values, (np.tile(rows, 2), columns)), shape=(len(time_s), len(knots_s)))
 
 
 @dataclass(frozen=True, eq=False)

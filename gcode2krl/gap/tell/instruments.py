@@ -7,14 +7,16 @@ import numpy as np
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.decimals import step_of
 from gcode2krl.gap.beside.events import Whose
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.fit.noise_source import are_repeats
+from gcode2krl.gap.fit.pose_noise import is_revisited
 from gcode2krl.gap.tell.result import NoiseResult
 from gcode2krl.gap.tell.words import listed, number
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
-_REPEATS, _RUNS = "repeats", "each run by itself"
+_REPEATS, _RUNS, _POSES = "repeats", "each run by itself", "what no effect explains"
 
 
 def noise_of(judgement: Judgement) -> NoiseResult | None:
@@ -27,8 +29,14 @@ def noise_of(judgement: Judgement) -> NoiseResult | None:
         stated=judgement.factor * max(stated) if stated else None,
         learnt=judgement.factor * _rms([each.sigma for each in models]),
         short=judgement.factor * _rms([each.short_sigma for each in models]),
-        source=_REPEATS if are_repeats(traces) else _RUNS,
+        source=_source(traces),
     )
+
+
+def _source(traces: Sequence[Trace]) -> str:
+    if traces[0].still:
+        return _REPEATS if is_revisited(traces) else _POSES
+    return _REPEATS if are_repeats(traces) else _RUNS
 
 
 def _rms(values: Sequence[float]) -> float:
@@ -44,6 +52,9 @@ def readings_of_noise(judgements: Sequence[Judgement]) -> Iterator[str]:
         unit = judgement.link.unit
         said = f"{judgement.link.name}: the noise is neither stated nor repeated; "
         said += f"taken as {number(noise.learnt)} {unit}"
+        if judgement.traces[0].still and judgement.verdict == "no_gap":
+            off = judgement.factor * (judgement.size.before / judgement.traces[0].shape[1]) ** 0.5
+            said += f"; were it less, the {number(off)} {unit} that the poses are off by would be a gap"
         if noise.learnt > _LIMITS.same_reading * noise.short:
             said += (
                 f", of which {number(noise.short)} {unit} are forgotten within milliseconds: "

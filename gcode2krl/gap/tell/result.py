@@ -63,7 +63,7 @@ class NoiseResult:
     short: float
     """What of it is forgotten within milliseconds: the other reading, where nothing else is known."""
     source: str
-    """In the JSON object ``from``: repeats, or each run by itself."""
+    """In the JSON object ``from``: repeats, each run by itself, or (of poses) what no effect explains."""
 
 
 @dataclass(frozen=True, kw_only=True)

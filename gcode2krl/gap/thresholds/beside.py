@@ -67,6 +67,9 @@ class BesideThresholds:
     stretch_s: float = physics(
         1.0, "longer than an instrument remembers; rows of one stretch stay together in every split"
     )
+    stretches_most: int = convention(
+        120, "stretches of one run: of more its scatter is known well enough, and their memory grows"
+    )
     burst_s: float = convention(0.1, "over which the roughness of a signal tells a burst of its instrument")
     burst_times: float = convention(
         4.0, "times its usual roughness a signal is in a burst; white noise is not in 300,000 rows"

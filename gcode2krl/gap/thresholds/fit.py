@@ -25,6 +25,11 @@ class FitThresholds:
         "times what run.toml states: a data sheet states the best; more than that is a finding, not noise",
     )
 
+    poses_least_again: int = convention(8, "readings of poses visited again from which they tell the noise")
+    poses_chance: float = convention(
+        0.01, "that one of all signatures explains so much of too few poses by chance: then it is no noise"
+    )
+
     noise_most_lines: int = convention(8, "tones of one signal that are taken off before its noise is learnt")
     noise_false_lines: float = convention(
         1e-3, "chance that a line of noise alone counts as a tone, by an exponential distribution of power"
