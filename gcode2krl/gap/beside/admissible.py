@@ -25,8 +25,8 @@ _FOLLOWS_S = (0.004, 0.01, 0.025)
 """Time constants of a servo's two lags behind a jerk."""
 _WARMS_S = (2.0, 8.0, 30.0)
 """Time constants with which a spindle grows after it has started."""
-_PLAYS_LOAD = (0.05, 0.1, 0.2, 0.4, 0.8)
-"""Widths of play of a torque or a force, over its range: a sum of plays is any loop (Prandtl & Ishlinskii)."""
+_PLAYS_LOAD = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""Widths of play of a torque or a force, over its range; a sum of plays is any smooth loop."""
 _LATE_S = tuple(0.002 * 1.4**i for i in range(14))
 """Delays of a force, to 0.16 s: a sensor's chain alone has 5 to 50 ms, with the robot's reaction 150 ms."""
 
@@ -194,8 +194,9 @@ class Admissible:
         late: Floats = np.moveaxis(np.stack([*shifted, *filtered]), (0, 1, 2), (2, 1, 0))
         return late
 
+    @cached_property
     def with_memory(self) -> Floats:
-        """Return the signal itself and what play operators leave of it (k, n, c), of each component by itself."""
+        """(k, n, c) the signal itself and what play operators leave of it, of each component by itself."""
         return np.stack([np.column_stack([own, _plays(own)]) for own in self.trace.nominal.T])
 
     @cached_property

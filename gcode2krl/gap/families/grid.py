@@ -35,7 +35,7 @@ TIMING = "timing"
 class Place:
     """Where a deviation is: its name, and the columns (k, n, d) of each trace that a unit of it makes.
 
-    Along each axis by itself d is 3, along one direction 1: both have the same name, and the better one speaks.
+    Along each axis by itself d is 3, along one direction 1: of one name, for which the better one speaks.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Grid:
         """Yield a place along its axes, along the tool, and along gravity where the tool is not."""
         yield Place(name, where, tuple(self._axes(trace) for trace in self.traces))
         tool = self._along([own.tool_axes[:, :, 2] for own in self.inputs])
-        down = self._along([np.tile(own.trace.inputs.gravity, (len(own.trace.time_s), 1)) for own in self.inputs])
+        down = self._along([np.tile(t.inputs.gravity, (len(t.time_s), 1)) for t in self.traces])
         yield Place(name, where, tool)
         if not _is_alike(tool, down):
             yield Place(name, where, down)
@@ -116,7 +116,7 @@ class Grid:
         return np.repeat(np.diag(self._sigma)[:, None, :], n, axis=1).reshape(k, n, k)
 
     def _along(self, vectors: Sequence[Floats]) -> tuple[Floats, ...]:
-        """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``, as the signal states them."""
+        """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``."""
         sigma = float(np.mean(self._sigma))
         return tuple(
             sigma * own.as_stated(each)[:, list(own.trace.columns)].T[:, :, None]
@@ -144,8 +144,10 @@ class Grid:
             for on, functions in self._functions(place):
                 if functions.width:
                     yield Family(place, on, *place.lifted(functions), directions=place.width)
-            if place.width > 1:
-                yield from self._of_the_pose(place) if place.where is Where.TIP else self._of_the_signal(place)
+            if place.width > 1 and place.where is Where.TIP:
+                yield from self._of_the_pose(place)
+            elif place.width > 1:
+                yield from self._of_the_signal(place)
 
     # Functions at a place
 
@@ -269,7 +271,7 @@ class Grid:
         sigma = float(np.mean(self._sigma))
         late = _scaled([each.late() for each in self.inputs], sigma)
         yield Family(place, Dependence.VELOCITY, late, tuple(np.eye(late[0].shape[2])[:, :, None]))
-        loops = [each.with_memory() for each in self.inputs]
+        loops = [each.with_memory for each in self.inputs]
         wide = [
             np.einsum("knc,kj->knjc", each, np.eye(len(each))).reshape(*each.shape[:2], -1) for each in loops
         ]
