@@ -25,8 +25,10 @@ _FOLLOWS_S = (0.004, 0.01, 0.025)
 """Time constants of a servo's two lags behind a jerk."""
 _WARMS_S = (2.0, 8.0, 30.0)
 """Time constants with which a spindle grows after it has started."""
-_PLAYS_TORQUE = (0.1, 0.4)
-"""Half-widths of play of a torque, over its range."""
+_PLAYS_LOAD = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""Widths of play of a torque or a force, over its range; a sum of plays is any smooth loop."""
+_LATE_S = tuple(0.002 * 1.4**i for i in range(14))
+"""Delays of a force, to 0.16 s: a sensor's chain alone has 5 to 50 ms, with the robot's reaction 150 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +99,10 @@ class Admissible:
     def tool_axes(self) -> Floats:
         """(n, 3, 3) rotations of the tool."""
         return self.trace.inputs.tool_rotation[self._nearest]
+
+    def as_stated(self, vectors: Floats) -> Floats:
+        """Return vectors (n, 3) along ``$BASE`` along the axes in which the signal is stated."""
+        return self.trace.as_stated(vectors, self._nearest)
 
     @cached_property
     def force_N(self) -> Floats:
@@ -174,10 +180,24 @@ class Admissible:
 
     def torque_with_memory(self, joint: int) -> Floats:
         """Return what play operators leave of a joint's torque (n, c)."""
-        torque = np.ascontiguousarray(self._torque[:, joint])
-        reach = float(np.ptp(torque))
-        plays = [torque - play(torque, 0.5 * share * reach) for share in _PLAYS_TORQUE]
-        return self._at(np.stack(plays, axis=1))
+        return self._at(_plays(self._torque[:, joint]))
+
+    def late(self) -> Floats:
+        """Return by how much the signal (k, n, c) differs where it is late: by a time, or as a filter is."""
+        trace, nominal = self.trace, self.trace.nominal
+        shifted = [trace.late(by_s) - nominal for by_s in _LATE_S]
+        filtered = [
+            np.stack([lag(each, trace.time_s, by_s) for each in (nominal - nominal[:1]).T], axis=1)
+            - (nominal - nominal[:1])
+            for by_s in _LATE_S
+        ]
+        late: Floats = np.moveaxis(np.stack([*shifted, *filtered]), (0, 1, 2), (2, 1, 0))
+        return late
+
+    @cached_property
+    def with_memory(self) -> Floats:
+        """(k, n, c) the signal itself and what play operators leave of it, of each component by itself."""
+        return np.stack([np.column_stack([own, _plays(own)]) for own in self.trace.nominal.T])
 
     @cached_property
     def jacobian(self) -> Floats:
@@ -204,3 +224,10 @@ class Admissible:
         load = np.abs(self._torque[:, joint])
         loaded = direction * load / max(float(load.max(initial=0.0)), 1e-12)
         return np.stack([direction, *plays, *settling, loaded], axis=1)[self._nearest]
+
+
+def _plays(values: Floats) -> Floats:
+    """Return what play operators of several widths leave of values (n,), (n, c)."""
+    values = np.ascontiguousarray(values)
+    reach = float(np.ptp(values))
+    return np.stack([values - play(values, 0.5 * share * reach) for share in _PLAYS_LOAD], axis=1)

@@ -178,6 +178,14 @@ class Trace:
         """Of ``plus`` and of ``minus``, whose clocks may differ."""
         return LastPath(), LastPath()
 
+    def late(self, by_s: float) -> Floats:
+        """Return what the model says (n, k) of an instrument that states what was true some time before."""
+        return self._at(self._plain, self.time_s - by_s)
+
+    def as_stated(self, vectors: Floats, rows: Ints) -> Floats:
+        """Return vectors (n, 3) along ``$BASE``, at these rows (n,) of the model, along the signal's axes."""
+        return self._turned(self.inputs, vectors, rows)
+
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
         if not applied:
@@ -230,12 +238,12 @@ class Trace:
             values = interpolate(signals, self.plus, times, plus)
             values = values - interpolate(signals, self.minus or "", other, minus)
         if self.in_sensor_frame or self.in_tool_frame:
-            values = self._turned(signals, values, times)
+            values = self._turned(signals.inputs, values, nearest_rows(signals.inputs.time_s, times))
         return values[:, list(self.columns)]
 
-    def _turned(self, signals: Signals, values: Floats, times: Floats) -> Floats:
-        inputs = signals.inputs
+    def _turned(self, inputs: Inputs, values: Floats, rows: Ints) -> Floats:
+        if not (self.in_sensor_frame or self.in_tool_frame):
+            return values
         rotation = inputs.sensor_rotation if self.in_sensor_frame else inputs.tool_rotation
-        row = nearest_rows(inputs.time_s, times)
-        turned: Floats = np.einsum("nji,nj->ni", rotation[row], values)
+        turned: Floats = np.einsum("nji,nj->ni", rotation[rows], values)
         return turned

@@ -134,6 +134,11 @@ class Examination:
         return tuple(self.applied[number] for number in self.cause_numbers)
 
     @property
+    def cost(self) -> float:
+        """Return chi2 and the cost of the numbers."""
+        return self.fitted.chi2 + self.fitted.occam
+
+    @property
     def mismatch(self) -> tuple[Applied, ...]:
         """Return the accepted effects that are within normal mismatch."""
         return tuple(each for each, usual in zip(self.applied, self.usual, strict=True) if usual)

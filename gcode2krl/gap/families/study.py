@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.families.columns import Columns
+from gcode2krl.gap.families.directions import along_one
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.nested import simplest_first
@@ -48,7 +49,8 @@ def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> lis
         columns = Columns(rows.of(family.columns, place.component))
         for view, own, sign in zip(views, found, signs, strict=True):
             at = view.at(place.component)
-            _add(own, [evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)])
+            every = evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)
+            _add(own, [every, along_one(at, every, family, columns, sign)])
     for place in grid.places:
         for own, evidences in zip(found, _searched(rows, views, place, signs), strict=True):
             _add(own, evidences)

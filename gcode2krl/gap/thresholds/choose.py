@@ -100,6 +100,10 @@ class ChooseThresholds:
     bent_rival_share: float = calibrated(
         0.7, DEVELOPMENT, "the same of a rival that is not proportional to its size"
     )
+    twin_share: float = convention(
+        0.8, "of what an effect does while it is small: a candidate that does as much then is refitted"
+    )
+    most_twins: int = convention(3, "of those that are refitted beside an effect, the nearest first")
     rival_gain: float = calibrated(15.0, DEVELOPMENT, "a rival within this gain of the cause is refitted")
     least_unknown: float = convention(0.02, "no probability is nearer to 0 or 1: nothing is certain")
 

@@ -70,5 +70,12 @@ class FamilyThresholds:
         "right mastering of A1 a smooth function was ahead of a constant by 0.0003",
     )
 
+    time_ahead_share: float = calibrated(
+        0.1,
+        DEVELOPMENT,
+        "the same of what each run has over time, which fits any input of a slow motion: smooth loops of a "
+        "torque were behind it by 0.05",
+    )
+
     # The answer
     least_probability: float = convention(0.05, "a less probable family is not listed")
