@@ -240,7 +240,7 @@ def test_the_material_is_removed_once(part):
 
 
 def test_a_collision_is_half_a_sine_that_bends_the_arm(swinging, known):
-    """2 kN for 50 ms, its impulse 2·T/pi·F whatever the samples, in the run whose time it is and in no other."""
+    """2 kN for 50 ms, its impulse 2·T/pi·F whatever the samples, in the run of its time and in no other."""
     for hours, at_s in ((0.0, 8.003), (0.5, 1808.003)):
         inputs = replace(swinging, hours=hours)
         text = f"collision:at_s={at_s},size_N=2000,lasts_s=0.05,direction=0/0/-3"

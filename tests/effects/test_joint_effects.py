@@ -217,7 +217,7 @@ def ramps(inputs, acceleration, run_s=0.4, pause_s=1.2):
 
 
 def test_a_drive_at_its_limit_falls_behind_and_catches_up(swinging, known):
-    """Two thirds of the acceleration of a ramp: behind by a sixth of a·t² when it ends, there within a second."""
+    """Two thirds of the acceleration of a ramp: behind by a sixth of a·t², and there within a second."""
     inputs = ramps(swinging, 1.5)
     limit = 1.0 / DEG
     signals = run(inputs, known, f"current_limit:target=A2,limit_deg_s2={limit}")

@@ -1,7 +1,5 @@
 """A bearing whose axis wobbles while it turns."""
 
-import math
-
 import numpy as np
 
 from gcode2krl.arrays import Floats
@@ -50,10 +48,10 @@ class _Wobble(Effect):
 class BearingWobble(_Wobble):
     """All that the axis carries tilts by ``amplitude_mrad`` about a line across the axis, which goes round.
 
-    The line turns by ``per_turn`` a turn of the joint, from ``phase`` at 0 degrees, seen from the link before:
-    a cage turns 0.4-0.5 times, rollers pass a spot of a ring so many times (Harris 2001: half the number of
-    rollers, less a tenth). To first order in the angle; joints as commanded. Of the spindle: the tip goes
-    round the tool's axis by ``amplitude_mm`` (see `at`).
+    The line turns by ``per_turn`` a turn of the joint, from ``phase`` at 0 degrees, seen from the link
+    before: a cage turns 0.4-0.5 times, rollers pass a spot of a ring somewhat fewer times than half of them
+    are (Harris 2001, Rolling Bearing Analysis). To first order in the angle; joints as commanded. Of the
+    spindle: the tip goes round the tool's axis by ``amplitude_mm`` (see `at`).
     """
 
     depends_on = frozenset({Dependence.OWN_ANGLE, Dependence.PLACE})
@@ -65,7 +63,7 @@ class BearingWobble(_Wobble):
             start=0.05,
             source="tilt of slewing bearings 5-20 µm over 0.3 m: 0.02-0.07; worn ones ten times that",
         ),
-        _per_turn(0.2, 0.43, (0.43, 8.0, 18.0), "cages 0.4-0.5, rings with 10-100 rollers 4-50"),
+        _per_turn(0.2, 0.43, (0.43, 8.0), "cages 0.4-0.5, rings with 10-100 rollers 4-50"),
         phase_parameter(),
     )
 

@@ -13,7 +13,7 @@ from gcode2krl.units import N_PER_KN, RAD_PER_DEG
 
 
 class BeltWindUp(Effect):
-    """Behind the gear: deg_per_kNm·w is added, relax·w' + w = own torque, w the torque at the run's start there.
+    """Behind the gear: deg_per_kNm·w is added, relax·w' + w = own torque, settled at the start of each run.
 
     The delayed part of a standard linear solid (Zener); what gives way at once is `gear_twist` and in the
     stiffness of the cell. So the tip follows it as well as an encoder behind the belt. The torque is
@@ -40,7 +40,7 @@ class BeltWindUp(Effect):
             high=600.0,
             nominal=None,
             start=5.0,
-            grid=(1.0, 5.0, 30.0),
+            grid=(2.0, 20.0),
             minimum=1e-2,
             role=Role.SHAPE,
             source="polyurethane and rubber belts relax within seconds to minutes",

@@ -44,10 +44,10 @@ class _Ratchet(Effect):
 class BoltRatchet(_Ratchet):
     """The tip or the part moves by ``step_mm`` each time the cutting force rises above ``threshold_N``.
 
-    It stays there and slips again once the force has been below nine tenths of the threshold in between. Along a
-    direction in `$BASE`, whatever the direction of the force; counted from none in each run: what earlier runs
-    have left is a `step` between them. A fixture shows in the finished part alone. Of a joint: by ``step_deg``
-    with its own torque, see `at`.
+    It stays there and slips again once the force has been below nine tenths of the threshold in between.
+    Along a direction in ``$BASE``, whatever that of the force, and counted from none in each run: what
+    earlier ones have left is a `step` between them. A fixture shows in the finished part alone. Of a joint:
+    by ``step_deg`` with its own torque, see `at`.
     """
 
     where = frozenset({Where.TIP})

@@ -14,12 +14,12 @@ from gcode2krl.units import S_PER_H
 
 
 class Collision(Effect):
-    """From ``at_s`` on, for ``lasts_s``, the tool is pushed by half a sine of ``size_N`` along `$BASE`.
+    """From ``at_s`` on, for ``lasts_s``, the tool is pushed by half a sine of ``size_N``.
 
-    ``at_s`` counts from the start of the earliest run, as that of `step`: one number says in which run. The
-    sensor shows the push and the arm bends by it, at rest as the model bends. Each sample has the mean over
-    its time, so that the impulse is right whatever the sampling. What slips stays off: that is a `step` of the
-    tip or of a joint at the same moment, an effect of its own.
+    The direction is one in ``$BASE``. ``at_s`` counts from the start of the earliest run, as that of `step`:
+    one number says in which run. The sensor shows the push and the arm bends by it, at rest as the model
+    bends. Each sample has the mean over its time, so that the impulse is right whatever the sampling. What
+    slips stays off: that is a `step` of the tip or of a joint at the same moment, an effect of its own.
     """
 
     name = "collision"

@@ -20,9 +20,9 @@ class CurrentLimit(Effect):
     """The joint's acceleration is held within ``limit_deg_s2``: q_act falls behind, then catches up.
 
     Within the limit the drive does what is commanded. What it is behind it catches up as a position loop of
-    ``k_v_per_s`` does, no faster than a fifth of the limit could brake again. The limit is one of acceleration,
-    as if the torque were all inertia: gravity and cutting force take none of it. Not given, the limit is what
-    the run demands at most: nothing is cut off.
+    ``k_v_per_s`` does, no faster than a fifth of the limit could brake again (our choice). The limit is one
+    of acceleration, as if the torque were all inertia: gravity and cutting force take none of it. Not given,
+    it is what the run demands at most, and nothing is cut off.
     """
 
     name = "current_limit"

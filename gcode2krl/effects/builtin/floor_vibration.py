@@ -16,7 +16,7 @@ _AXES = ("x", "y", "z")
 
 
 class FloorVibration(Effect):
-    """The tip moves by amplitude·sin(2·pi·hz·t + phase) along one axis of `$BASE`, whatever the robot does.
+    """The tip moves by amplitude·sin(2·pi·hz·t + phase) along one axis of ``$BASE``, whatever the robot does.
 
     t from the start of the earliest run, so the phase goes on from run to run as far as ``hz`` is held: of a
     machine nearby that is off by one in a thousand it is lost after a minute at 10 Hz, and each run then has
@@ -52,7 +52,7 @@ class FloorVibration(Effect):
     )
 
     def targets(self, cell: Cell) -> tuple[Target, ...]:
-        """Return the axes of `$BASE`."""
+        """Return the axes of ``$BASE``."""
         return _AXES
 
     def tcp(self, tcp_mm: Floats, deflection_mm: Floats, inputs: Inputs, applied: Applied) -> Floats:

@@ -12,11 +12,11 @@ from gcode2krl.effects.parameter import size_from_zero
 
 
 class ForceHysteresis(Effect):
-    """Along each axis of the sensor: reading = F - loss·(F - play(F)), the play ± half of the largest |F| wide.
+    """Along each axis of the sensor: reading = F - loss·(F - play(F)), the play ± half the largest |F| wide.
 
-    Cycled between ± the largest force of the run the loop is ``loss_percent`` of that wide: unloading, the
-    reading is too high. Proportional to the load cycle, as the hysteresis of strain gauges and their glue is
-    (Masing's rule); data sheets state it at full scale. Forces alone: moments stay.
+    Cycled between ± the largest force of the run the loop is ``loss_percent`` of that wide: unloaded, the
+    reading is half of it too high. Proportional to the load cycle, as the hysteresis of strain gauges and
+    their glue is (Masing's rule); data sheets state it at full scale. Forces alone: moments stay.
     """
 
     name = "force_hysteresis"

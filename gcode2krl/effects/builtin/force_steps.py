@@ -10,9 +10,10 @@ from gcode2krl.effects.parameter import Parameter, Role
 
 
 class ForceSteps(Effect):
-    """Along each axis of the sensor the reading is the nearest multiple of ``step_N``: off by step/sqrt(12) rms.
+    """Along each axis of the sensor the reading is the nearest multiple of ``step_N``.
 
-    A converter with too wide a range, or a table with too few decimals. Moments stay.
+    Off by step/sqrt(12) rms where the force varies by several steps (Widrow 1956). A converter with too wide
+    a range, or a table with too few decimals. Moments stay.
     """
 
     name = "force_steps"

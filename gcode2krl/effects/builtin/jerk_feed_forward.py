@@ -43,7 +43,7 @@ class JerkFeedForward(Effect):
             high=0.1,
             nominal=None,
             start=0.01,
-            grid=(0.004, 0.01, 0.025),
+            grid=(0.01,),
             minimum=1e-4,
             role=Role.SHAPE,
             source="velocity loops of drives settle within 4-25 ms",

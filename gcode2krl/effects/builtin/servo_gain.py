@@ -15,10 +15,10 @@ _K_V_PER_S = 30.0
 class ServoGain(Effect):
     """q_act' = k_v·(q_cmd - q_act) + (1 - missing)·q_cmd': a loop of gain k_v and what is fed forward to it.
 
-    So q_act = q_cmd + missing·(lag(q_cmd) - q_cmd), a lag of 1/k_v: behind by missing/k_v times the speed once
-    that has been steady for 1/k_v; below 0 ahead. All of it missing is `servo_lag` of 1/k_v. To first order
-    the twin of that, of `dead_time` and of a `clock` of q_cmd. A loop has no error at rest, so a static gain
-    is not in it (Groß et al. 2006, Electrical Feed Drives; velocity loop taken as much faster).
+    So q_act = q_cmd + missing·(lag(q_cmd) - q_cmd), a lag of 1/k_v: behind by missing/k_v times the speed,
+    as soon as that has been steady for 1/k_v; below 0 ahead. All of it missing is `servo_lag` of 1/k_v. To
+    first order the twin of that, of `dead_time` and of a `clock` of q_cmd. A loop has no error at rest, so a
+    static gain is not in it (Groß et al. 2006, Electrical Feed Drives; velocity loop taken as much faster).
     """
 
     name = "servo_gain"
@@ -47,7 +47,7 @@ class ServoGain(Effect):
             high=200.0,
             nominal=None,
             start=_K_V_PER_S,
-            grid=(10.0, _K_V_PER_S),
+            grid=(_K_V_PER_S,),
             minimum=0.1,
             role=Role.SHAPE,
             source="position loops of robots 10-50 1/s, of machine tools up to 170 (10 m/min per mm)",

@@ -21,10 +21,10 @@ _LEAST = 0.05
 class SpindleDroop(Effect):
     """True speed = programmed speed·(1 - percent_per_Nm/100·torque), torque that of the nominal cut.
 
-    The feed per tooth rises with the time between two teeth, and so the force: the law of the material at the
-    thicker chip, on the nominal arcs and depth. That the torque then rises a little too is left out, a tenth
-    of a tenth at a droop of 10 %. Static: the drive's own recovery, some tenths of a second, is not in it. The
-    moment about the tip stays the nominal one.
+    The feed per tooth rises with the time between two teeth, and so the force: the law of the material at
+    the thicker chip, on the nominal arcs and depth. That the torque then rises too is left out: of a droop
+    of 10 % it makes 11. Static: the drive's own recovery, some tenths of a second, is not in it. The moment
+    about the tip stays the nominal one.
     """
 
     name = "spindle_droop"
@@ -39,7 +39,7 @@ class SpindleDroop(Effect):
             "%/(N·m)",
             high=50.0,
             start=1.0,
-            source="asynchronous spindles slip 2-5 % at their 5-20 N·m; without control of speed 10 times that",
+            source="asynchronous spindles slip 2-5 % at their 5-20 N·m; universal motors 10 times that",
         ),
     )
 
