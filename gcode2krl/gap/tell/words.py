@@ -12,7 +12,7 @@ _AXES = ("x", "y", "z")
 _UNITS = {
     name: name
     for name in ("mm", "deg", "rad", "mrad", "N", "Nm", "kNm", "kg", "s", "ms", "h", "m", "cm", "K")
-} | {"um": "µm", "hz": "Hz", "s2": "s²", "krpm": "1000/min"}
+} | {"um": "µm", "hz": "Hz", "s2": "s²", "s3": "s³", "krpm": "1000/min", "percent": "%"}
 """Words at the end of a parameter's name that are units -> how they are written."""
 _TARGETS = {
     "tracker": "the tracker",
@@ -20,6 +20,7 @@ _TARGETS = {
     "controller": "the controller's log",
     "q_cmd": "the commanded joints",
     "q_load": "the load encoders",
+    "all": "all axes",
 }
 _FORCE_AXES = ("fx", "fy", "fz")
 _FORMS = {
