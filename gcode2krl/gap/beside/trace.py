@@ -10,7 +10,7 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.interpolation import LastPath, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -175,6 +175,17 @@ class Trace:
         if not applied:
             return self._at(self._plain, self.time_s)
         return self._at(self._simulated((*self.base, *applied)), self.time_s)
+
+    def model_error(self, applied: Sequence[Applied]) -> Floats:
+        """Return by how much the model may be off (n, k) where it, not noise, is the limit.
+
+        To its accuracy come what its samples miss of a sharp corner: by how much every other one misses more.
+        """
+        signals = self.signals(applied)
+        times = signals.true_time(self.plus, self.time_s)
+        values = values_of(signals, self.plus)[:, list(self.columns)]
+        fine, coarse = cubic(times, signals.time_s, values), cubic(times, signals.time_s[::2], values[::2])
+        return self.link.model_rms + np.abs(fine - coarse)
 
     def signals(self, applied: Sequence[Applied]) -> Signals:
         """Return all signals of the model with these effects at work besides the base."""
