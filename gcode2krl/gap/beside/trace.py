@@ -192,6 +192,17 @@ class Trace:
             return self._at(self._plain, self.time_s)
         return self._at(self._simulated((*self.base, *applied)), self.time_s)
 
+    def model_error(self, applied: Sequence[Applied]) -> Floats:
+        """Return by how much the model may be off (n, k) where it, not noise, is the limit.
+
+        To its accuracy come what its samples miss of a sharp corner: by how much every other one misses more.
+        """
+        signals = self.signals(applied)
+        times = signals.true_time(self.plus, self.time_s)
+        values = values_of(signals, self.plus)[:, list(self.columns)]
+        fine, coarse = cubic(times, signals.time_s, values), cubic(times, signals.time_s[::2], values[::2])
+        return self.link.model_rms + np.abs(fine - coarse)
+
     def signals(self, applied: Sequence[Applied]) -> Signals:
         """Return all signals of the model with these effects at work besides the base."""
         return self._simulated((*self.base, *applied))

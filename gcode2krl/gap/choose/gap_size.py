@@ -55,6 +55,8 @@ class Size:
     """Degrees of freedom of the deviation."""
     calm_excess: float = 0.0
     """The excess of rows that are no louder than usual: events and heavy tails are not of its test."""
+    moments_off: int = 0
+    """Rows in which a model without noise is off by more than its accuracy, after the effects."""
 
     @property
     def power(self) -> float:
@@ -64,7 +66,8 @@ class Size:
     @property
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
-        return self.calm_excess > _as_many_deviations(self.freedom) * self.deviation
+        loud = self.calm_excess > _as_many_deviations(self.freedom) * self.deviation
+        return loud or self.moments_off >= _LIMITS.model_off_rows
 
     @property
     def share_left(self) -> float:
@@ -98,6 +101,7 @@ def pooled(sizes: Sequence[Size]) -> Size:
         largest_after=max(size.largest_after for size in sizes),
         calm_excess=mean([size.calm_excess for size in sizes]),
         freedom=sum(size.freedom for size in sizes),
+        moments_off=sum(size.moments_off for size in sizes),
     )
 
 
@@ -130,7 +134,22 @@ def size_of_gap(
         largest_after=_largest(after),
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2,
         freedom=freedom,
+        moments_off=moments_off(traces, structured, [*usual, *applied]),
     )
+
+
+def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequence[Applied]) -> int:
+    """Return in how many rows a rest (n, k) is beyond the accuracy of a model; 0 where noise is the limit.
+
+    A mean over the run does not see what is off at its corners alone.
+    """
+    if traces[0].link.model_rms == 0.0:
+        return 0
+    beyond = (
+        np.abs(rest) > _LIMITS.model_off * trace.model_error(applied)
+        for trace, rest in zip(traces, left, strict=True)
+    )
+    return sum(int(np.count_nonzero(rows.any(axis=1))) for rows in beyond)
 
 
 def _less(values: Sequence[Floats], others: Sequence[Floats]) -> list[Floats]:

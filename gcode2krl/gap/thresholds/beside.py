@@ -135,6 +135,9 @@ class BesideThresholds:
     path_still_mm: float = convention(1e-3, "samples that go no further are at rest")
 
     fine_step_s: float = physics(0.004, "cycle of a KRC4 under RSI; a blended corner lasts some 5 ms")
+    corner_step_s: float = physics(
+        0.001, "at 0.2 m/s and 60 m/s2 across a corner of 0.5 mm samples 4 ms apart miss 0.1 mm, these 0.01"
+    )
     fine_same_mm: float = convention(
         0.05, "planned anew, a prediction's samples are met to this, or its laws are others"
     )

@@ -82,6 +82,10 @@ class ChooseThresholds:
     least_spread: float = convention(
         0.1, "of the mean over the root of the count: the least standard deviation of a mean square"
     )
+    model_off: float = convention(
+        2.0, "times the accuracy of a model without noise: a moment that is further off is a gap, however short"
+    )
+    model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
     observable_share: float = convention(
         0.02, "an effect whose power nuisance leaves less of is not observable in that link"
     )
