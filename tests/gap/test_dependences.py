@@ -45,7 +45,30 @@ def test_a_tone_is_periodic():
     best = next(iter(depends_on(found)))
     assert (best.at, best.on, best.form, best.unit) == ("A1", "tone", "periodic", "deg")
     assert best.at_time_s is None
+    assert best.frequency_hz == pytest.approx(5.3, abs=0.05)
+    assert best.course is None
     assert best.size == pytest.approx(2.0 * SIGMA, rel=0.2)
+
+
+def test_a_drift_has_its_course_in_the_run_that_is_off_most():
+    found = servo(lambda run, t: (4.0 if run else -0.5) * (t / t[-1]) ** 2)
+    drift = next(each for each in depends_on(found) if each.form == "drift")
+    assert drift.course.run == "run-2"
+    assert (drift.course.over, drift.course.over_unit, drift.course.unit) == ("time in the run", "s", "deg")
+    t_s, off = np.transpose(drift.course.points)
+    assert off == pytest.approx(4.0 * SIGMA * (t_s / c.motion().time_s[-1]) ** 2, abs=0.6 * SIGMA)
+
+
+def test_a_deviation_that_follows_the_velocity_has_its_course_over_it():
+    inputs = c.motion()
+    rate = np.gradient(inputs.q_cmd_rad[:, 0], inputs.time_s)
+    found = servo(lambda run, t: -5.0 * np.tanh(4.0 * rate / np.abs(rate).max()))
+    fast = next(each for each in depends_on(found) if each.on == "velocity")
+    assert (fast.course.over, fast.course.over_unit, fast.course.run) == ("velocity of A1", "deg/s", None)
+    speed, off = np.transpose(fast.course.points)
+    assert np.all(np.diff(speed) > 0.0)
+    assert off[0] > 3.0 * SIGMA
+    assert off[-1] < -3.0 * SIGMA
 
 
 def test_a_step_of_the_tip_has_a_direction():

@@ -20,7 +20,7 @@ from gcode2krl.gap.tell.events import IMPULSE, events_of, impulses_of
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
 from gcode2krl.gap.tell.instruments import issues_of, noise_of, readings_of_noise
 from gcode2krl.gap.tell.next_run import next_run_of
-from gcode2krl.gap.tell.part_size import at_part, at_part_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of, run_sizes
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,
@@ -53,7 +53,7 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
     of_largest = residuals[largest.link] if largest is not None else []
     return Gap(
         verdict=_verdict(judgements, slips),
-        gap=_size(_with_largest_gap(judgements, largest), slips),
+        gap=_size(_with_largest_gap(judgements, largest), slips, residuals),
         links=tuple(_links(judgements, slips)),
         at_part=_at_part(judgements, slips, residuals),
         events=tuple(event for judgement in signals for event in events_of(judgement)),
@@ -132,7 +132,9 @@ def _verdict(judgements: Sequence[Judged], slips: Sequence[Slip]) -> str:
     return "partly_explained"
 
 
-def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
+def _size(
+    largest: Judged | None, slips: Sequence[Slip], residuals: Mapping[Link, Sequence[Residual]]
+) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
         return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
@@ -147,6 +149,7 @@ def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
         max_after=factor * size.largest_after,
         shrink=largest.shrink,
         held_out=largest.held_out,
+        per_run=run_sizes(largest, residuals.get(link, ())) if isinstance(largest, Judgement) else (),
     )
 
 
