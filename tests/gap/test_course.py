@@ -16,7 +16,6 @@ OWN = Admissible(TRACE)
     ("on", "joint", "over", "unit", "x"),
     [
         (Dependence.RUN_START, None, "time in the run", "s", OWN.since_start_s),
-        (Dependence.TRAVEL, None, "travel", "m", OWN.travel_mm / 1000.0),
         (Dependence.PLACE, None, "place along y", "mm", OWN.position_mm[:, 1]),
         (Dependence.VELOCITY, None, "velocity along x", "mm/s", OWN.velocity_mm_s[:, 0]),
         (Dependence.OWN_ANGLE, 1, "angle of A2", "deg", np.degrees(OWN.q_rad[:, 1])),

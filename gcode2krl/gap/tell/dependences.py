@@ -33,10 +33,10 @@ _AXES = ("fx", "fy", "fz")
 _TIP = "tip"
 
 
-def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[DependsOnResult]:
+def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[DependsOnResult, Evidence]]:
     """Yield on what the gap of a link without a name, or beside named causes, may depend; best first.
 
-    ``larger_links`` have a larger gap without a name.
+    With each what the family says. ``larger_links`` have a larger gap without a name.
     """
     rest = judgement.rest
     if rest is None or judgement.verdict in ("no_gap", "explained"):
@@ -45,7 +45,7 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[DependsO
         return
     for told in family_probabilities(rest, larger_links):
         if told.probability >= _LIMITS.least_probability:
-            yield _result(judgement, told)
+            yield _result(judgement, told), told.evidence
 
 
 def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
