@@ -58,7 +58,7 @@ def judgement(
         size=size,
         told=size,
         factor=1.0,
-        applied=(),
+        applied=tuple(each.applied for each in causes if each.probability >= LIMITS.named),
         every=tuple(runs or found.traces),
         impulses=impulses,
         rest=None,

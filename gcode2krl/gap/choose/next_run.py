@@ -219,7 +219,7 @@ def open_pairs(judgements: Sequence[Judgement], families: Sequence[Family] = ())
         likely = [cause for cause in judgement.causes if cause.probability >= _LIMITS.least_open]
         for cause in likely:
             yield from _pairs_of(cause, judgement, of_link)
-        if not likely:
+        if not judgement.applied:  # a cause without a name leaves its families open
             yield from _between(of_link, judgement)
 
 
@@ -244,7 +244,7 @@ def _pairs_of(cause: Cause, judgement: Judgement, families: Sequence[Answer]) ->
 
 
 def _between(families: Sequence[Answer], judgement: Judgement) -> Iterator[OpenPair]:
-    """Yield the pairs of a link without a cause: of each signal its families, or the only one and none.
+    """Yield the pairs of a link without a named cause: of each signal its families, or the only one and none.
 
     Families of two joints are no rivals: both may be right. One that stands alone has to foretell a program.
     """

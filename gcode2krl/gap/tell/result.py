@@ -313,7 +313,8 @@ class CauseResult:
     words: str | None = None
     """Of a set-up slip, what shows it; None for other causes."""
     indistinguishable_from: tuple[EffectAt | UnknownAt, ...] = ()
-    """Others that these data cannot tell from it: they share the probability."""
+    """Others that these data cannot tell from it: they share the probability. The last one may be something
+    of its place and input that the library lacks."""
     rivals: tuple[RivalResult, ...] | None = None
     """None where no other effect was compared with it."""
     family: str | None = None
