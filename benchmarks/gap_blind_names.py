@@ -17,7 +17,14 @@ def named_of(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 def names(cause: dict[str, Any], truth: Truth) -> bool:
     """Tell whether a cause, or a member of its set, is this effect at this target."""
+    if cause.get("kind") == "unknown":
+        return False
     return cause["effect"] == truth[0] and (cause["target"] == truth[1] or truth[0] in ANY_TARGET)
+
+
+def effects_alike(cause: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the effects of the library that a cause declares indistinguishable from it."""
+    return [each for each in cause.get("indistinguishable_from") or () if each.get("kind") != "unknown"]
 
 
 def declares(cause: dict[str, Any], truth: Truth) -> bool:

@@ -106,7 +106,7 @@ def test_the_largest_gap_is_that_over_its_noise_and_links_with_one_come_first():
 
 
 def test_sizes_are_in_the_unit_of_the_report():
-    size = assembly._size(_judgement(GEAR, "unexplained"), [])
+    size = assembly._size(_judgement(GEAR, "unexplained"), [], {})
     assert (size.signal, size.unit) == (GEAR.signal, "deg")
     assert (size.rms_before, size.rms_after, size.noise_floor) == (20.0, 10.0, 5.0)
     assert (size.max_before, size.max_after, size.held_out) == (50.0, 20.0, True)
@@ -114,9 +114,9 @@ def test_sizes_are_in_the_unit_of_the_report():
 
 
 def test_a_slip_states_the_size_where_links_have_no_gap():
-    size = assembly._size(_judgement(GEAR), [_slip()])
+    size = assembly._size(_judgement(GEAR), [_slip()], {})
     assert (size.signal, size.rms_before, size.rms_after) == (PATH.signal, 2.0, 0.1)
-    nothing = assembly._size(None, [])
+    nothing = assembly._size(None, [], {})
     assert (nothing.signal, nothing.unit, nothing.rms_before) == ("tcp", "mm", None)
 
 

@@ -57,6 +57,9 @@ class FamilyTests:
     """The best other family with the cause taken out."""
     components: frozenset[int]
     """Of the signal, which the cause moves."""
+    family_behind: float | None = None
+    """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
+    None where its family says nothing."""
 
     def is_near(self, evidence: Evidence) -> bool:
         """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
@@ -207,6 +210,7 @@ class LinkFamilies:
             other_power=0.0 if other is None else self._power_share(other, number),
             other_p=1.0 if other is None else rest.p_of(other),
             family=own[0] if own else None,
+            family_behind=(form_nats - own[0].nats) / own[0].inflation if own else None,
             better=better,
             components=components,
         )

@@ -27,7 +27,7 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "where": plain(gap.where),
         "events": plain(gap.events),
         "causes": plain(gap.causes),
-        "unexplained": plain(gap.unexplained),
+        "unexplained": _unexplained(gap.unexplained),
         "not_examined": plain(gap.not_examined),
         "observable": plain(gap.observable),
         "next_run": _next_run(gap.next_run),
@@ -35,6 +35,14 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "notes": list(gap.notes),
         "issues": [_issue(issue) for issue in gap.issues],
     }
+
+
+def _unexplained(unexplained: Any) -> dict[str, Any]:
+    """Return what is left; a moment is ``t_s`` as in events, and ``at_time_s`` as it was first called."""
+    told: dict[str, Any] = plain(unexplained)
+    for each in told["depends_on"]:
+        each["t_s"] = each["at_time_s"]
+    return told
 
 
 def _next_run(run: Any) -> dict[str, Any] | None:

@@ -13,6 +13,7 @@ from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
+from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.dependences import depends_on
@@ -20,7 +21,7 @@ from gcode2krl.gap.tell.events import IMPULSE, events_of, impulses_of
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
 from gcode2krl.gap.tell.instruments import issues_of, noise_of, readings_of_noise
 from gcode2krl.gap.tell.next_run import next_run_of
-from gcode2krl.gap.tell.part_size import at_part, at_part_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of, run_sizes
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,
@@ -49,11 +50,12 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         for judged in signals
         if judged is largest or judged.verdict != "no_gap"
     }
-    unexplained = _unexplained(largest, signals)
+    dependences = list(_dependences(signals))
+    unexplained = _unexplained(largest, [each for each, _ in dependences])
     of_largest = residuals[largest.link] if largest is not None else []
     return Gap(
         verdict=_verdict(judgements, slips),
-        gap=_size(_with_largest_gap(judgements, largest), slips),
+        gap=_size(_with_largest_gap(judgements, largest), slips, residuals),
         links=tuple(_links(judgements, slips)),
         at_part=_at_part(judgements, slips, residuals),
         events=tuple(event for judgement in signals for event in events_of(judgement)),
@@ -64,9 +66,7 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
-        next_run=next_run_of(
-            context, signals, [each for each in unexplained.depends_on if each.form != IMPULSE]
-        ),
+        next_run=next_run_of(context, signals, [each for each in dependences if each[0].form != IMPULSE]),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
@@ -132,7 +132,9 @@ def _verdict(judgements: Sequence[Judged], slips: Sequence[Slip]) -> str:
     return "partly_explained"
 
 
-def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
+def _size(
+    largest: Judged | None, slips: Sequence[Slip], residuals: Mapping[Link, Sequence[Residual]]
+) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
         return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
@@ -147,6 +149,7 @@ def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
         max_after=factor * size.largest_after,
         shrink=largest.shrink,
         held_out=largest.held_out,
+        per_run=run_sizes(largest, residuals.get(link, ())) if isinstance(largest, Judgement) else (),
     )
 
 
@@ -248,14 +251,20 @@ def _reported_in(cause: Cause, judgement: Judged) -> Link:
     return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
 
 
-def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -> Unexplained:
+def _dependences(signals: Sequence[Judgement]) -> Iterator[tuple[DependsOnResult, Evidence | None]]:
+    """Yield on what depends what is left of all links, the largest gap first; of a family what it says."""
+    links: set[str] = set()
+    for judgement in sorted(signals, key=_weight, reverse=True):
+        own: list[tuple[DependsOnResult, Evidence | None]] = [(each, None) for each in impulses_of(judgement)]
+        own += depends_on(judgement, larger_links=len(links | {each.link for each, _ in own}))
+        links |= {each.link for each, _ in own}
+        yield from own
+
+
+def _unexplained(largest: Judgement | None, families: Sequence[DependsOnResult] = ()) -> Unexplained:
     """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
-    families: list[DependsOnResult] = []
-    for judgement in sorted(signals, key=_weight, reverse=True):
-        families += impulses_of(judgement)
-        families += depends_on(judgement, larger_links=len({each.link for each in families}))
     size = largest.told
     left = bool(size.significant) and largest.verdict != "explained"
     significant = left or any(each.link == largest.link.name for each in families)

@@ -1,6 +1,6 @@
 """Causes as the answer states them: effects that a link was explained by, and set-up slips."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,8 +9,9 @@ from gcode2krl.gap.beside.events import line_at
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import Cause, Judged
+from gcode2krl.gap.choose.probability_table import declared_nats
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.result import CauseResult, EffectAt, MomentResult, RivalResult
+from gcode2krl.gap.tell.result import CauseResult, EffectAt, MomentResult, RivalResult, UnknownAt
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_H
 
@@ -32,9 +33,12 @@ def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] =
         shrink=cause.shrink,
         rms_after=None if cause.rms_after is None else judgement.factor * cause.rms_after,
         constant=cause.constant,
-        indistinguishable_from=tuple(
-            EffectAt(rival.applied.effect.name, rival.applied.target, rival.behind_nats)
-            for rival in alike[: THRESHOLDS.tell.most_alike]
+        indistinguishable_from=(
+            *(
+                EffectAt(rival.applied.effect.name, rival.applied.target, rival.behind_nats)
+                for rival in alike[: THRESHOLDS.tell.most_alike]
+            ),
+            *_unknown(cause),
         ),
         rivals=None
         if cause.rivals is None
@@ -64,6 +68,15 @@ def _moment(cause: Cause, pairs: Sequence[Pair]) -> MomentResult | None:
             t_s = float(np.interp(at_s, times_s, pair.inputs.time_s))
             return MomentResult(run=pair.name, t_s=t_s, line=line_at(pair.inputs, t_s))
     return None
+
+
+def _unknown(cause: Cause) -> Iterator[UnknownAt]:
+    """Yield an unknown of a cause's kind, where the data do not tell it from the cause's form."""
+    tests = cause.tests
+    if tests is None or tests.family is None or tests.family_behind is None:
+        return
+    if tests.family_behind < declared_nats():
+        yield UnknownAt(tests.family.place.name, tests.family.on.value)
 
 
 def _family(cause: Cause) -> str | None:

@@ -113,12 +113,20 @@ def _off(gap: Gap) -> str:
     if at is None:
         size = gap.gap
         return "The runs differ" if size.rms_before is None else f"{rounded(size.rms_before)} {size.unit} RMS"
-    size_text = amount(at.rms_before, at.unit)
+    size_text, worst = amount(at.rms_before, at.unit), _worst_run(at)
     if at.what != "time":
-        return _OFF[at.what].format(size=size_text)
+        return _OFF[at.what].format(size=size_text) + worst
     if at.link == "timing":
-        return f"The robot is {size_text} RMS early or late on its path"
+        return f"The robot is {size_text} RMS early or late on its path{worst}"
     return f"Time stamps are off by {size_text}"
+
+
+def _worst_run(at: AtPart) -> str:
+    """Return the size of the gap in the run that is off most, where it is off by much more than all are."""
+    worst = max(at.per_run, key=lambda each: each.rms_before, default=None)
+    if worst is None or worst.rms_before < _LIMITS.worst_run * at.rms_before:
+        return ""
+    return f", {amount(worst.rms_before, at.unit)} in {worst.run}"
 
 
 def _mostly(gap: Gap) -> str:
@@ -136,6 +144,8 @@ def _mostly(gap: Gap) -> str:
     if first.rms < _LIMITS.phase_over_rest * _rms_of(phases[1:]):
         return ""
     share = next(words for least, words in _SHARES.items() if first.share >= least)
+    if at is not None and _worst_run(at):
+        share = share.replace("of it", "of the gap")  # "it" would be that run's
     joint = f" of axis {joints[0].joint[1:]}" if first.phase == "reversal" and joints else ""
     return f", {share} {_PHASES[first.phase]}{joint}"
 
@@ -178,7 +188,16 @@ def _left(gap: Gap) -> str:
         if gap.gap.shrink is None:
             return ""
         return f"{model} {gap.gap.shrink:.0%} of the gap is gone{held}{_rest(gap)}."
-    return f"{model} {amount(at.rms_after, at.unit)} are left{held}{_beside(at)}{_rest(gap)}."
+    left = amount(at.rms_after, at.unit)
+    before = at.held_out_before
+    if held and before is not None and not _is_about(before, at.rms_before):
+        left += f" of {amount(before, at.unit)}"
+    return f"{model} {left} are left{held}{_beside(at)}{_rest(gap)}."
+
+
+def _is_about(size: float, other: float) -> bool:
+    """Tell whether two sizes are so near that one cannot be mistaken for another share of a gap."""
+    return max(size, other) < _LIMITS.worst_run * min(size, other)
 
 
 def _beside(at: AtPart) -> str:

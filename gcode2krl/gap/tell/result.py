@@ -19,8 +19,23 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunSize:
+    """The gap of one run, in the unit of what it is part of."""
+
+    run: str
+    rms_before: float
+    rms_after: float | None
+    """With the named causes as the runs that explain say they are; None where that is not known."""
+    held_out: bool
+    """The run only tests: nothing was chosen or fitted with it."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class GapSize:
-    """The signal with the largest gap over its noise, in its unit; None where nothing was compared."""
+    """The signal with the largest gap over its noise, in its unit; None where nothing was compared.
+
+    ``rms_before``, ``rms_after``, the largest values and ``shrink`` are of held-out data where there are any.
+    """
 
     signal: str
     unit: str
@@ -33,6 +48,8 @@ class GapSize:
     shrink: float | None = None
     """Share of the explainable gap that is gone on held-out data."""
     held_out: bool = False
+    per_run: tuple[RunSize, ...] = ()
+    """Of every run, those that explain and those that are held out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +61,17 @@ class AtPart:
     in deg, where nothing else is known."""
     unit: str
     rms_before: float
+    """Over all runs."""
     rms_after: float | None
     """With the named causes in the model, on held-out data; None where that is not known."""
     noise: float | None
     """In the same unit; None where the size was converted, which takes the noise out of it."""
     link: str
     """The link that shows it."""
+    held_out_before: float | None = None
+    """On the data that ``rms_after`` is of; None where that is not known."""
+    per_run: tuple[RunSize, ...] = ()
+    """Of every run; empty where a run has no size of its own, as for clocks, scans and slips."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +203,30 @@ class RivalResult:
     """By how much it is worse than the cause."""
 
 
+@dataclass(frozen=True)
+class UnknownAt:
+    """Something that the library lacks, by its place and the input that it depends on."""
+
+    kind: str = field(default="unknown", init=False)
+    at: str
+    on: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """How a deviation goes over an input: a few points, each the mean of a stretch of the input."""
+
+    over: str
+    """The input, ``torque of A2``."""
+    over_unit: str
+    unit: str
+    """Of the deviation, along ``direction`` where there is one."""
+    points: tuple[tuple[float, float], ...]
+    """(input, deviation), by rising input."""
+    run: str | None = None
+    """Where each run has a course of its own, that which this one is of: the run that deviates most."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class DependsOnResult:
     """On what a gap without a name depends: where, on which input, in which form."""
@@ -196,7 +242,7 @@ class DependsOnResult:
     share: float
     """Of the gap's power beyond noise that it takes."""
     at_time_s: float | None = None
-    """Of a step or an impulse, its moment in `run`."""
+    """Of a step or an impulse, its moment in `run`; in the JSON object ``t_s`` too."""
     run: str | None = None
     line: int | None = None
     """Of the G-code, at that moment."""
@@ -205,6 +251,10 @@ class DependsOnResult:
     unit: str | None = None
     direction: tuple[float, ...] | None = None
     """Unit vector in ``$BASE`` of what moves the tip or is a force."""
+    frequency_hz: float | None = None
+    """Of a tone."""
+    course: Course | None = None
+    """Of a drift or a smooth function, how it goes over its input."""
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`choose.features.FamilyFeatures`)."""
 
@@ -262,8 +312,9 @@ class CauseResult:
     rms_after: float | None
     words: str | None = None
     """Of a set-up slip, what shows it; None for other causes."""
-    indistinguishable_from: tuple[EffectAt, ...] = ()
-    """Others that these data cannot tell from it: they share the probability."""
+    indistinguishable_from: tuple[EffectAt | UnknownAt, ...] = ()
+    """Others that these data cannot tell from it: they share the probability. The last one may be something
+    of its place and input that the library lacks."""
     rivals: tuple[RivalResult, ...] | None = None
     """None where no other effect was compared with it."""
     family: str | None = None

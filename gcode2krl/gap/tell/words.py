@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, NextRun
+from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, NextRun, UnknownAt
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -131,14 +131,20 @@ def listed(words: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
-def alike(effects: Sequence[EffectAt]) -> str:
+def alike(others: Sequence[EffectAt | UnknownAt]) -> str:
     """Return what a cause cannot be told from."""
-    return listed([named(each.effect, each.target) for each in effects], "or")
+    return listed([_other(each) for each in others], "or")
+
+
+def _other(other: EffectAt | UnknownAt) -> str:
+    if isinstance(other, UnknownAt):
+        return f"something that the library lacks ({other.at}, {other.on})"
+    return named(other.effect, other.target)
 
 
 def depends(found: DependsOnResult) -> str:
     """Return where a gap is and on what it depends: ``tip, a step at 11.2 s of run-1 and all later runs``."""
-    return ", ".join([_place(found), _form(found), *_size(found)])
+    return ", ".join([_place(found), _form(found), *_size(found), *_course(found)])
 
 
 def what_there_is(found: DependsOnResult) -> str:
@@ -146,6 +152,25 @@ def what_there_is(found: DependsOnResult) -> str:
     place = _place(found)
     where = {"tip": "at the tip", "force": "in the force", "timing": "in time"}.get(place, f"in {place}")
     return ", ".join([f"{_form(found)} {where}", *_size(found)])
+
+
+def _course(found: DependsOnResult) -> list[str]:
+    """Return a course by its ends and, where it lies between them, its farthest point from their line."""
+    course = found.course
+    if course is None:
+        return []
+    (x0, y0), *_, (x1, y1) = course.points
+
+    def bend(point: tuple[float, float]) -> float:
+        return abs(point[1] - y0 - (y1 - y0) * (point[0] - x0) / (x1 - x0))
+
+    far = max(course.points, key=bend)
+    told = [(x0, y0), (x1, y1)]
+    if bend(far) > max(abs(y1 - y0), max(abs(y) for _, y in course.points)) / 2.0:
+        told.insert(1, far)
+    words = [f"{rounded(y)} {course.unit} at {rounded(x)} {course.over_unit}" for x, y in told]
+    run = f" of {course.run}" if course.run else ""
+    return [f"over {course.over}{run}: {' to '.join(words)}"]
 
 
 def _place(found: DependsOnResult) -> str:
@@ -159,6 +184,8 @@ def _form(found: DependsOnResult) -> str:
         later = " and all later runs" if found.form == "step" else ""
         run = f" of {found.run}{line}{later}" if found.run else ""
         return f"{'a' if found.form == 'step' else 'an'} {found.form} at {found.at_time_s:.1f} s{run}"
+    if found.frequency_hz is not None:
+        return f"a tone of {number(found.frequency_hz)} Hz"
     return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
 
 
