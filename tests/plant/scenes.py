@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 
+from tests.plant import arm as arms
 from tests.plant import instruments
 from tests.plant.instruments import Instruments
 from tests.plant.robot import STAGES, Hooks, Mismatch, Run
@@ -14,6 +15,8 @@ READ = Instruments(tracker_hz=250.0, force_hz=250.0, controller_s=0.004, force_m
 CHANNELS = {"tcp": 3, "force": 3, "cmd": 6, "act": 6, "load": 6}
 """Columns of each; `act` and `load` are read against `cmd`, in degrees."""
 ORDER = list(STAGES)
+JOINTS_ONLY = {"lags", "servo", "gear", "tip", "sense"}
+"""Stages whose hooks leave load and structure alone, so that the tip follows the joints."""
 
 Signals = dict[str, np.ndarray]
 
@@ -30,6 +33,8 @@ class Scene:
             if work is not None:
                 work(run)
             self.after[stage] = copy.copy(run)
+        self.run = run
+        self.tip_per_rad, self.turn_per_rad = self._per_rad()
         self.tables = instruments.clean(run, READ)
         self.signals = signals_of(self.tables)
 
@@ -55,7 +60,7 @@ class Scene:
         at = ORDER.index(later[0]) if later else len(ORDER)
         run, begin = None, at
         if "world" in hooks:
-            for stage in ("bend", "load", "world"):
+            for stage in ("sense", "bend", "load", "world"):
                 run = _own(self.before[stage], age_s, number)
                 hooks["world"](run)
                 begin = ORDER.index(stage)
@@ -65,13 +70,41 @@ class Scene:
             run = _own(self.after[later[0]], age_s, number)
             hooks[later[0]](run)
             begin = at + 1
+        only_joints = set(hooks) <= JOINTS_ONLY
         for stage in ORDER[begin:]:
             work = STAGES[stage]
-            if work is not None:
+            if stage == "tip" and only_joints:
+                self._turn(run)
+            elif work is not None:
                 work(run)
             if stage in later and not ("world" not in hooks and stage == later[0]):
                 hooks[stage](run)
         return run
+
+
+    def _per_rad(self) -> tuple[np.ndarray, np.ndarray]:
+        """Way of the tip in mm and turn of its axes by each joint, (n, 3, 6) each, at the fast samples."""
+        run, n, base = self.run, len(self.run.t_s), self.run.world.base.axes
+        way, turn = np.empty((n, 3, 6)), np.empty((n, 3, 6))
+        for j in range(6):
+            low, high = (
+                arms.pose(run.arm, np.ascontiguousarray(run.q_load + angle * np.eye(6)[j]))
+                for angle in (-1e-4, 1e-4)
+            )
+            way[:, :, j] = (high[0] - low[0]) @ base / 2e-4
+            spin = np.einsum("nij,nkj->nik", (high[1] - low[1]) / 2e-4, base @ run.tip_axes)
+            turn[:, :, j] = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) @ base
+        return way, turn
+
+    def _turn(self, run: Run) -> None:
+        """The structure's answer to other joint angles under the same load, to first order."""
+        bare = self.after["tip"]
+        off = run.q_load + run.zero_rad - bare.q_load
+        run.tip_mm = bare.tip_mm + np.einsum("nij,nj->ni", self.tip_per_rad, off)
+        turned = np.einsum("nij,nj->ni", self.turn_per_rad, off)
+        run.tip_axes = bare.tip_axes + np.cross(turned[:, None, :], bare.tip_axes, axisb=2, axisc=1, axisa=2)
+        run.part_mm = bare.part_mm.copy()
+        run.twist_rad, run.bending_mm, run.arm = bare.twist_rad, bare.bending_mm, bare.arm
 
 
 def _allows(stage: str, run: Run, bare: Run) -> bool:
@@ -83,7 +116,9 @@ def _allows(stage: str, run: Run, bare: Run) -> bool:
         and run.world.stock_turn_deg == bare.world.stock_turn_deg
         and run.depth_taper_mm == bare.depth_taper_mm
     )
-    return {"bend": planned and cut, "load": planned, "world": True}[stage]
+    stands = not run.payload and not run.reshape and not np.any(run.zero_rad)
+    read = planned and run.world is bare.world and stands
+    return {"sense": read, "bend": planned and cut, "load": planned, "world": True}[stage]
 
 
 def _own(run: Run, age_s: float, number: int) -> Run:
