@@ -31,8 +31,20 @@ from tests.plant.effects import LIBRARY
 from tests.plant.faults import Fault
 from tests.plant.instruments import Instruments
 from tests.plant.plans import Day, Plan
-from tests.plant.scenes import CHANNELS, Signals
-from tests.plant.signatures import EVENTS, MOST_SHARE, SQUARED, TONES, Column, Library, Start, columns, nuisances, sparse, starts
+from tests.plant.scenes import Signals
+from tests.plant.signatures import (
+    EVENTS,
+    MOST_SHARE,
+    SQUARED,
+    TONES,
+    Column,
+    Library,
+    Start,
+    columns,
+    nuisances,
+    sparse,
+    starts,
+)
 
 DECIDABLE, OPEN = 10.0, 3.0
 BEAM = 5
@@ -81,7 +93,7 @@ def class_of(nats: float) -> str:
     return "decidable" if nats >= DECIDABLE else "open" if nats >= OPEN else "undecidable"
 
 
-# linear algebra: everything by products of whitened columns --------------------------------------------------
+# linear algebra: everything by products of whitened columns -------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -276,8 +288,12 @@ class Case:
                     key = (channel.name, axis)
                     there = [(k, s[key]) for k, s in cols if key in s]
                     if there:
-                        yield r, channel, axis, np.array([k for k, _ in there]), channel.whitened(
-                            np.stack([x for _, x in there], axis=1)
+                        yield (
+                            r,
+                            channel,
+                            axis,
+                            np.array([k for k, _ in there]),
+                            channel.whitened(np.stack([x for _, x in there], axis=1)),
                         )
 
     def _products(self) -> np.ndarray:
@@ -293,7 +309,8 @@ class Case:
         place = np.zeros(self.width)
         place[at] = values
         return {
-            k: v - self.rows[k][1] @ place[self.rows[k][0]] if k in self.rows else v for k, v in change.items()
+            k: v - self.rows[k][1] @ place[self.rows[k][0]] if k in self.rows else v
+            for k, v in change.items()
         }
 
     def line(self, fit: Fit) -> dict[tuple, np.ndarray]:
@@ -426,7 +443,9 @@ def tone_of(rest: dict[tuple, np.ndarray], channels_: Sequence[Channel], low: fl
     for (_, name, _), values in rest.items():
         if name == "tcp":
             n = int(1.0 / (0.01 * step_s))
-            seen = np.abs(np.fft.rfft(values, n)) ** 2 if len(values) <= n else np.abs(np.fft.rfft(values)) ** 2
+            seen = (
+                np.abs(np.fft.rfft(values, n)) ** 2 if len(values) <= n else np.abs(np.fft.rfft(values)) ** 2
+            )
             power += np.interp(hz, np.fft.rfftfreq(max(n, len(values)), step_s), seen)
     return float(hz[int(np.argmax(power))])
 
@@ -601,7 +620,7 @@ def _found(name: str, rest: dict[tuple, np.ndarray], channels_: Sequence[Channel
         if name in EVENTS:
             run, at_s = moment_of(rest, channels_, EVENTS[name])
             given |= {i: run for i, kind in enumerate(start.asked) if kind[0] == "pick" and i in given}
-            if run >= 2 or dict(start.given) != {**dict(start.given), **{i: run for i in given}}:
+            if run >= 2 or dict(start.given) != {**dict(start.given), **dict.fromkeys(given, run)}:
                 continue
             share = (at_s - low) / (high - low)
         else:
@@ -626,7 +645,9 @@ def of_plan(
 
     `without`: effects that are taken out of the library.
     """
-    shown = [f.kind.signal != "scan" and f.kind.family != "set-up" or f.kind.name in EVENTS for f in plan.faults]
+    shown = [
+        (f.kind.signal != "scan" and f.kind.family != "set-up") or f.kind.name in EVENTS for f in plan.faults
+    ]
     if not any(shown):
         return [None] * len(shown)
     case = Case(library, plan.how, plan.days)

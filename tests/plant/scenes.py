@@ -81,7 +81,6 @@ class Scene:
                 hooks[stage](run)
         return run
 
-
     def _per_rad(self) -> tuple[np.ndarray, np.ndarray]:
         """Way of the tip in mm and turn of its axes by each joint, (n, 3, 6) each, at the fast samples."""
         run, n, base = self.run, len(self.run.t_s), self.run.world.base.axes

@@ -1,7 +1,7 @@
 """Signatures: what each effect of the library, and each mismatch, does to the measured links at its start.
 
-A builder of an effect asks a `Draw` for its numbers. `Script` answers with given numbers in place of chance, so
-that every effect becomes a function of its size, its directions and shares of its ranges, without a second
+A builder of an effect asks a `Draw` for its numbers. `Script` answers with given numbers in place of chance,
+so that every effect becomes a function of its size, its directions and shares of its ranges, without a second
 description of it. Signatures are finite differences of that function. Directions count as vectors, so that
 three columns make all of them; shares of ranges start at a grid, or in the middle with a column for a small
 step.
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.plant.effects.registry import LIBRARY, Draw, Kind
+from tests.plant.effects.registry import ALL, LIBRARY, Draw, Kind
 from tests.plant.mismatch import BOUNDS, CLOCKS
 from tests.plant.robot import Hooks, ripple, slack
 from tests.plant.scenes import Scene, Signals
@@ -30,6 +30,9 @@ GRIDS: dict[str, dict[int, tuple[float, ...]]] = {  # effect -> number of the qu
     "spindle_growth": {0: (0.1, 0.4, 0.9)},
     "vibration": {1: (0.08, 0.25, 0.42, 0.58, 0.75, 0.92)},
     "nonlinear_stiffness": {0: (0.2, 0.8)},
+    "belt_wind_up": {0: (0.1, 0.5, 0.9)},
+    "spindle_droop": {0: (0.2, 0.8)},
+    "current_limit": {0: (0.5,)},
 }
 FACTORS = {  # sizes to start at, in units of the middle one, of effects that are not linear in their size
     "clock": (0.5, 2.5),
@@ -39,6 +42,12 @@ FACTORS = {  # sizes to start at, in units of the middle one, of effects that ar
     "velocity_rule": (0.5, 2.0),
     "backlash": (0.4, 2.5),
     "stock_offset": (0.4, 2.0),
+    "dead_time": (0.4, 2.5),
+    "tracker_filter": (0.3, 1.0),
+    "force_hysteresis": (0.3, 3.0),
+    "force_steps": (0.5, 3.0),
+    "current_limit": (10.0, 25.0, 60.0),
+    "spindle_droop": (1.0, 10.0),
 }
 SQUARED = ("vibration",)  # a direction counts twice: drive and answer lie along it
 EVENTS = {"step": "step", "collision": "impulse", "bolt_ratchet": "step"}
@@ -51,12 +60,13 @@ UNSEEN = ("scan",)  # signals that no column has
 class Script(Draw):
     """Answers of a builder's questions, given in the order in which they are asked.
 
-    `asked` notes each: ("share",), ("sign",), ("pick", count) or ("direction",). Answers: a share in 0 ... 1, a
-    sign, a number of a choice, a vector. A question without an answer gets 0.5, 1, 0 or x.
+    `asked` notes each: ("share",), ("sign",), ("pick", count) or ("direction",). Answers: a share in 0 ... 1,
+    a sign, a number of a choice, a vector. A question without an answer gets 0.5, 1, 0 or x.
     """
 
     def __init__(self, given: dict[int, object] | None = None, wanted: str | None = None):
         self.given, self.wanted, self.asked, self.names = given or {}, wanted, [], ()
+        self.all_too = False
         self.ranges: dict[int, tuple[float, float]] = {}  # of each share
         self.rng = _Scripted(self)
 
@@ -69,6 +79,11 @@ class Script(Draw):
         """The wanted one, or the first."""
         self.names = tuple(dict.fromkeys(names))
         return self.wanted or self.names[0]
+
+    def axes(self) -> tuple[str, list[int]]:
+        """As asked for; notes that all joints at once are a target too."""
+        self.all_too = True
+        return super().axes()
 
     def uniform(self, low: float, high: float) -> float:
         """A share of the range."""
@@ -189,7 +204,7 @@ def starts(name: str) -> tuple[Start, ...]:
     first = Script()
     kind.same(first)
     out = []
-    for target in first.names or (None,):
+    for target in (*(first.names or (None,)), *((ALL,) if first.all_too else ())):
         script = Script({}, target)
         kind.same(script)
         kinds = list(script.asked)
@@ -212,7 +227,7 @@ def columns(start: Start) -> list[Column]:
     """The columns of a start, with bounds in units of its size."""
     most = LIBRARY[start.name].sizes[1] / start.size
     least = -most if start.signed or start.directions else 0.0
-    none = {i: (0.0, 0.0, 0.0) for i in start.directions}
+    none = dict.fromkeys(start.directions, (0.0, 0.0, 0.0))
     out = []
     if start.name in SQUARED:  # xx, yy, zz and the mixed ones
         ways = [*E, *((E[i] + E[j]) / np.sqrt(2.0) for i, j in ((0, 1), (0, 2), (1, 2)))]
@@ -326,9 +341,7 @@ def _clock(name: str) -> Hooks:
 @cache
 def nuisances() -> tuple[Nuisance, ...]:
     """All mismatch, a column each; encoders' zeros are no signature and stand in the fit itself."""
-    out = [
-        Nuisance(f"stiffness {k}", _scaled("stiffness", k, BOUNDS["stiffness"])) for k in range(10)
-    ]
+    out = [Nuisance(f"stiffness {k}", _scaled("stiffness", k, BOUNDS["stiffness"])) for k in range(10)]
     out += [Nuisance(f"force {k}", _scaled("force", k, BOUNDS["coefficients"])) for k in range(6)]
     out += [Nuisance(f"gain {k}", _gain(k)) for k in range(3)]
     out += [Nuisance(f"lag {j}", _lag(j), 0.0) for j in range(6)]
@@ -391,7 +404,11 @@ class Library:
 
     def _of(self, key: tuple, make, keep: bool = True):
         if key not in self.kept:
-            file = None if self.folder is None or not keep else self.folder / ("-".join(map(str, key)) + ".pickle")
+            file = (
+                None
+                if self.folder is None or not keep
+                else self.folder / ("-".join(map(str, key)) + ".pickle")
+            )
             if file is not None and file.exists():
                 self.kept[key] = pickle.loads(file.read_bytes())
                 return self.kept[key]
@@ -412,4 +429,3 @@ def sparse(change: Signals) -> dict[tuple[str, int], np.ndarray]:
         for k in range(values.shape[1])
         if np.any(values[:, k] != 0.0)
     }
-
