@@ -172,7 +172,8 @@ def bounded(
     scale = np.sqrt(np.maximum(np.diag(p), 1e-30))
     root = np.linalg.cholesky(p / np.outer(scale, scale) + RELATIVE * np.eye(len(at)))
     target = np.linalg.solve(root, q / scale)
-    found = lsq_linear(root.T, target, bounds=(lower * scale, upper * scale + 1e-300))
+    bounds = (lower * scale, upper * scale + 1e-300)
+    found = lsq_linear(root.T, target, bounds=bounds, method="bvls", max_iter=5 * len(at))
     x = found.x / scale
     return float(max(products[0, 0] - 2.0 * q @ x + x @ p @ x, 0.0)), x
 
@@ -278,31 +279,36 @@ class Case:
                 bounds = np.array([(c.lower, c.upper) for c in cols])
                 self.blocks.append(Block(start.label, at, bounds[:, 0], bounds[:, 1], start))
         self.width, self.per_run = width, per_run
-        self.own = self._products()
+        self.own = np.zeros((width, width))
+        self.rows: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}  # by run, channel, axis
+        self._multiply(0)
 
-    def _stacks(self):
-        """Run, channel and axis with the columns that are not zero there, whitened."""
-        for r, cols in enumerate(self.per_run):
+    def _whitened(self, r: int, channel: Channel, axis: int, first: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Columns from `first` on that are not zero on an axis of a run, whitened; None without any."""
+        key = (channel.name, axis)
+        there = [(k, s[key]) for k, s in self.per_run[r] if k >= first and key in s]
+        if not there:
+            return None
+        return np.array([k for k, _ in there]), channel.whitened(np.stack([x for _, x in there], axis=1))
+
+    def _multiply(self, first: int) -> None:
+        """Products of all columns from `first` on with each other and with those before."""
+        for r in range(len(self.days)):
             for channel in self.channels:
                 for axis in channel.axes:
-                    key = (channel.name, axis)
-                    there = [(k, s[key]) for k, s in cols if key in s]
-                    if there:
-                        yield (
-                            r,
-                            channel,
-                            axis,
-                            np.array([k for k, _ in there]),
-                            channel.whitened(np.stack([x for _, x in there], axis=1)),
-                        )
-
-    def _products(self) -> np.ndarray:
-        out = np.zeros((self.width, self.width))
-        self.rows: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
-        for r, channel, axis, at, white in self._stacks():
-            out[np.ix_(at, at)] += white.T @ white
-            self.rows[(r, channel.name, axis)] = (at, white)
-        return out
+                    fresh = self._whitened(r, channel, axis, first)
+                    if fresh is None:
+                        continue
+                    at, white = fresh
+                    self.own[np.ix_(at, at)] += white.T @ white
+                    key = (r, channel.name, axis)
+                    if key in self.rows:
+                        old_at, old = self.rows[key]
+                        across = old.T @ white
+                        self.own[np.ix_(old_at, at)] += across
+                        self.own[np.ix_(at, old_at)] += across.T
+                        at, white = np.concatenate([old_at, at]), np.concatenate([old, white], axis=1)
+                    self.rows[key] = (at, white)
 
     def less(self, change: dict, at: np.ndarray, values: np.ndarray) -> dict:
         """A whitened change less columns of the products."""
@@ -339,7 +345,9 @@ class Case:
                 out.per_run[r] += [(int(k), s) for k, s in zip(at, signatures, strict=True)]
             out.width += len(bounds)
             out.blocks.append(Block(start.label, at, bounds[:, 0], bounds[:, 1], start))
-        out.own = out._products()
+        out.own, out.rows = np.zeros((out.width, out.width)), dict(self.rows)
+        out.own[: self.width, : self.width] = self.own
+        out._multiply(self.width)
         return out
 
     def white(self, changes: Sequence[Signals]) -> dict[tuple, np.ndarray]:

@@ -91,7 +91,7 @@ def _clipped(run: Run, j: int, share: float, hz: float) -> None:
     run.q_act[:, j] = memory.limited(command.copy(), peak * (1.0 - share), hz, STEP_s)
 
 
-@declare(LIBRARY, "servo", 1e-4, 0.9, signal="joint_actual", all_runs=True, depends=CLIPPED, moments=True)
+@declare(LIBRARY, "servo", 0.02, 0.9, signal="joint_actual", all_runs=True, depends=CLIPPED, moments=True)
 def current_limit(draw: Draw):
     """The drive gives `size` less than the largest acceleration of the run, falls behind and catches up.
 
