@@ -357,13 +357,27 @@ def nuisances() -> tuple[Nuisance, ...]:
 # kept -------------------------------------------------------------------------------------------------------
 
 
+PHYSICS = (
+    "arm",
+    "chips",
+    "instruments",
+    "masses",
+    "memory",
+    "mismatch",
+    "path",
+    "programs",
+    "robot",
+    "scene",
+)
+PHYSICS += ("scenes", "signatures", "turning", "waypoints")
+
+
 def digest() -> str:
     """A mark of the code that signatures depend on."""
     here = Path(__file__).parent
     out = hashlib.sha256()
-    for file in sorted((*here.glob("*.py"), *(here / "effects").glob("*.py"))):
-        if not file.name.startswith(("test_", "decidability")):
-            out.update(file.read_bytes())
+    for file in (*(here / f"{name}.py" for name in PHYSICS), *sorted((here / "effects").glob("*.py"))):
+        out.update(file.read_bytes())
     return out.hexdigest()[:16]
 
 
@@ -383,6 +397,13 @@ class Library:
         if program not in self.scenes:
             self.scenes[program] = Scene(program)
         return self.scenes[program]
+
+    def ready(self, days) -> None:
+        """Make all columns that the runs of a case need."""
+        for day in days:
+            self.mismatch(day.program)
+            for name in self.names:
+                self.of(name, day.program, day.age_s, day.number)
 
     def mismatch(self, program: str) -> list[dict]:
         """Sparse signals of each nuisance."""
