@@ -13,7 +13,6 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 _LIMITS = THRESHOLDS.tell
-_RPM_PER_RAD_S = S_PER_MIN / (2.0 * np.pi)
 _IN_EACH_RUN = frozenset({Dependence.RUN_TIME})
 """Each run has a course of its own."""
 _AXES = ("x", "y", "z")
@@ -76,7 +75,7 @@ def _inputs(own: Admissible, on: Dependence, joint: int | None) -> list[_Input]:
     if on is Dependence.METRES_CUT:
         return [("way cut", "m", own.cut_m)]
     if on is Dependence.SPINDLE_SPEED:
-        return [("spindle speed", "1/min", _RPM_PER_RAD_S * own.spindle[:, 0])]
+        return [("spindle speed", "1/min", S_PER_MIN / (2.0 * np.pi) * own.spindle[:, 0])]
     if on is Dependence.PLACE:
         return _along("place", "mm", own.position_mm)
     if on is Dependence.VELOCITY:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from gcode2krl.gap.tell.first_sentence import headline, stretch
 from gcode2krl.gap.tell.result import CauseResult, Gap, GapSize, IntervalResult, LinkResult
-from gcode2krl.gap.tell.words import alike, depends, describe, kind, next_run, number
+from gcode2krl.gap.tell.words import alike, depends, describe, happened, kind, next_run, number
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -20,7 +20,9 @@ def _lines(gap: Gap) -> Iterator[str]:
     if gap.links:
         yield from ("", "link        before      after       noise       verdict")
         yield from (_link(link) for link in gap.links)
-    yield from _section("run by run", _run_lines(gap.gap))
+    aside = "; the table above is of data not used" if gap.gap.held_out else ""
+    yield from _section(f"run by run, those that explain included{aside}", _run_lines(gap.gap))
+    yield from _section("what happened", (happened(each) for each in gap.events[: _LIMITS.report_lines]))
     yield from _section("where", where_lines(gap))
     yield from _section(
         "causes", (line for cause in gap.causes[: _LIMITS.report_lines] for line in _cause(cause))

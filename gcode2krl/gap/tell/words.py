@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, NextRun, UnknownAt
+from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, EventResult, NextRun, UnknownAt
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -23,6 +23,11 @@ _TARGETS = {
     "all": "all axes",
 }
 _FORCE_AXES = ("fx", "fy", "fz")
+_EVENTS = {
+    "impulse": "an impulse of {size} in {link}",
+    "slip": "a slip of {size} in {link}, which stays",
+    "burst": "a burst of {size} in {link}, its instrument's: left out",
+}
 _FORMS = {
     "drift": "a drift with {on}",
     "periodic": "periodic in {on}",
@@ -140,6 +145,13 @@ def _other(other: EffectAt | UnknownAt) -> str:
     if isinstance(other, UnknownAt):
         return f"something that the library lacks ({other.at}, {other.on})"
     return named(other.effect, other.target)
+
+
+def happened(event: EventResult) -> str:
+    """Return what happened in a moment: when, on which line, what, how large and for how long."""
+    line = f", line {event.line}" if event.line else ""
+    what = _EVENTS[event.what].format(size=f"{rounded(event.size)} {event.unit}", link=event.link)
+    return f"{event.t_s:.2f} s of {event.run}{line}: {what}, for {rounded(1000.0 * event.lasts_s)} ms"
 
 
 def depends(found: DependsOnResult) -> str:
