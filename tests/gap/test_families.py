@@ -204,17 +204,21 @@ def test_a_force_sensor_with_a_loop_depends_on_the_force():
     assert best.evidences[0].nats > 1.2 * other.nats
 
 
-@pytest.mark.parametrize("share", [0.03, 0.1, 0.3])
+@pytest.mark.parametrize("share", [0.03, 0.3])
 @pytest.mark.parametrize("joint", [1, 2])
 def test_a_smooth_loop_of_a_torque_is_no_time_in_the_run(share, joint):
-    traces = []
+    """Of narrow and of wide loops the family takes all but a hundredth."""
+    traces, loops = [], []
     for number in range(3):
         values = c.noise(COUNT, number, 1.0, 6)
         torque = Admissible(c.trace(values, "gear", number)).torque_Nm[:, joint]
-        values[:, joint] += 3.0 * dahl(torque, share * np.ptp(torque))
+        loops.append(3.0 * dahl(torque, share * np.ptp(torque)))
+        values[:, joint] += loops[-1]
         traces.append(c.trace(values, "gear", number))
     best = best_of(traces).evidences[0]
     assert (best.place.name, best.on) == (f"A{joint + 1}", Dependence.OWN_TORQUE)
+    loop = np.concatenate(loops)
+    assert np.mean((np.concatenate(best.signal)[:, 0] - loop) ** 2) < 0.01 * np.mean(loop**2)
 
 
 # Functions
