@@ -16,6 +16,8 @@ from gcode2krl.gap.fit.sensitivity import sensitivity_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
+_SETTLED = 0.1
+"""Of chi2: fits end where less is to be had."""
 _STEPS = 6
 """Half of a whole refit: a rival begins at its best linear fit."""
 
@@ -34,7 +36,7 @@ class Rival:
     @property
     def is_better(self) -> bool:
         """Tell whether the rival has more evidence than the cause."""
-        return self.cost_difference < 0.0
+        return self.cost_difference < -_SETTLED
 
     @property
     def behind_nats(self) -> float:
