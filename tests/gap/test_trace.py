@@ -75,19 +75,6 @@ def test_one_side_alone_may_be_late():
     np.testing.assert_allclose(one.nominal[INSIDE], expected[INSIDE], atol=2e-6)
 
 
-def test_where_the_path_jerks_columns_stamped_apart_are_uncertain():
-    """A joint that stops dead half way between two samples; the same stamps need nothing between samples."""
-    stopped_s = TIME_S[250] + 0.5 * (TIME_S[251] - TIME_S[250])
-    q = INPUTS.q_cmd_rad.copy()
-    q[:, 1] = 0.2 * np.minimum(TIME_S, stopped_s)
-    one = trace(np.zeros((500, 6)), "servo", inputs=replace(INPUTS, q_cmd_rad=q))
-    late = Applied(LIBRARY["clock"], "q_cmd", {"offset_s": 0.004, "skew": 0.0})
-    uncertain = np.flatnonzero(one.uncertain_rows([late], np.full(6, 1e-5)))
-    assert 1 <= len(uncertain) <= 8
-    assert np.all(np.abs(TIME_S[uncertain] - stopped_s) < 5.0 * (TIME_S[1] - TIME_S[0]))
-    assert not one.uncertain_rows([], np.full(6, 1e-5)).any()
-
-
 def test_rates_are_derivatives():
     path = trace(np.zeros((500, 6)), "path")
     np.testing.assert_allclose(path.rate[INSIDE], joint_rates(TIME_S)[INSIDE], atol=2e-4)

@@ -10,7 +10,7 @@ _fill_place = core_function("gap_place", FLOATS, FLOATS, OUT_INTS, OUT_FLOATS)
 _fill_lines = core_function("gap_lines", INTS, FLOATS, FLOATS, OUT_FLOATS)
 _fill_cubics = core_function("gap_cubics", INTS, FLOATS, FLOATS, FLOATS, OUT_FLOATS)
 
-PATHS = {
+_PATHS = {
     "tcp_base_mm": "position_mm",
     "q_cmd_rad": "q_cmd_rad",
     "q_act_rad": "q_cmd_rad",
@@ -55,7 +55,7 @@ def interpolate(signals: Signals, name: str, times_s: Floats, last: LastPath | N
     """
     last = last or LastPath()
     values = values_of(signals, name)
-    path = getattr(signals.inputs, PATHS[name], None) if name in PATHS else None
+    path = getattr(signals.inputs, _PATHS[name], None) if name in _PATHS else None
     if path is None:
         return linear(times_s, signals.time_s, values)
     if values is path:

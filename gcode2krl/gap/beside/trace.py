@@ -7,18 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.interpolation import (
-    PATHS,
-    LastPath,
-    cubic,
-    interpolate,
-    linear,
-    nearest_rows,
-    values_of,
-)
+from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -210,44 +202,22 @@ class Trace:
     def _simulated(self, applied: tuple[Applied, ...]) -> Signals:
         return self.link.simulated(self, applied)
 
-    def uncertain_rows(self, applied: Sequence[Applied], least: Floats) -> Bools:
-        """Return the rows (n,) where what two columns stamped apart differ by is uncertain by ``least`` (k,).
-
-        Their difference has in it how far the path goes from one stamp to the other. At a jerk that is
-        known no better than every other sample of the path tells it.
-        """
-        signals = self.signals(applied)
-        times, other = self._times(signals, self.time_s)
-        uncertain = np.zeros(len(times), dtype=np.bool_)
-        name = PATHS.get(self.plus, "")
-        if other is None or np.array_equal(times, other) or not name or len(signals.time_s) < 4:
-            return uncertain
-        path = getattr(signals.inputs, name)[:, list(self.columns)]
-        half = np.unique(np.append(np.arange(0, len(path), 2), len(path) - 1))
-        for at in (times, other):
-            apart = cubic(at, signals.time_s, path) - cubic(at, signals.time_s[half], path[half])
-            uncertain |= (np.abs(apart) > least).any(axis=1)
-        return uncertain
-
-    def _times(self, signals: Signals, stamps: Floats) -> tuple[Floats, Floats | None]:
-        """Return the times (n,) of ``plus`` and of ``minus`` at some stamps."""
-        times = signals.true_time(self.plus, stamps - self.plus_late_s)
-        if self.minus is None:
-            return times, None
-        # the inputs are this signal as it was stamped: a clock of its own shows in the other one
-        return times - signals.own_late_s(self.minus, stamps), signals.table_time(self.minus, stamps)
-
     def _at(self, signals: Signals, stamps: Floats) -> Floats:
-        times, other = self._times(signals, stamps)
-        if other is None:
+        times = signals.true_time(self.plus, stamps - self.plus_late_s)
+        if self.minus is not None:
+            # the inputs are this signal as it was stamped: a clock of its own shows in the other one
+            times = times - signals.own_late_s(self.minus, stamps)
+        if self.minus is None:
             values = interpolate(signals, self.plus, times, self._last_paths[0])
-        elif np.array_equal(times, other):
-            apart = values_of(signals, self.plus) - values_of(signals, self.minus or "")
-            values = linear(times, signals.time_s, apart)
         else:
-            plus, minus = self._last_paths
-            values = interpolate(signals, self.plus, times, plus)
-            values = values - interpolate(signals, self.minus or "", other, minus)
+            other = signals.table_time(self.minus, stamps)
+            if np.array_equal(times, other):
+                apart = values_of(signals, self.plus) - values_of(signals, self.minus)
+                values = linear(times, signals.time_s, apart)
+            else:
+                plus, minus = self._last_paths
+                values = interpolate(signals, self.plus, times, plus)
+                values = values - interpolate(signals, self.minus, other, minus)
         if self.in_sensor_frame or self.in_tool_frame:
             values = self._turned(signals.inputs, values, nearest_rows(signals.inputs.time_s, times))
         return values[:, list(self.columns)]

@@ -58,6 +58,12 @@ class LinkData:
         likelihood = likelihood.counting(once)
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
 
+    def settled(self) -> "LinkData":
+        """Return the data without the columns of candidates, which only a selection needs."""
+        self.known.forget()
+        candidates = replace(self.candidates, signatures=())
+        return replace(self, candidates=candidates, signatures=SignatureGram.none())
+
     @property
     def values(self) -> int:
         """Return the number of values."""

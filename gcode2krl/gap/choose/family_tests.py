@@ -96,6 +96,8 @@ class Rest:
     """Fall of chi2 by all that is known to explain the gap: the power of the gap beyond noise."""
     is_sized: bool = False
     """Its size alone is significant: then families need not prove that there is a rest."""
+    upstream_gain: float = 0.0
+    """Power beyond noise of what earlier links have shown of the joints, and the model has of them."""
 
     def share(self, evidence: Evidence) -> float:
         """Return the share of the gap's power that a family takes; 0 where it is not significant."""
@@ -105,7 +107,8 @@ class Rest:
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
         best = max(self.study.evidences, key=net_gain, default=None)
-        if best is None:
+        # of all that is known the form is known to a hundredth of its size, however long one looks at it
+        if best is None or net_gain(best) < _LIMITS.form_error**2 * (self.gap_gain + self.upstream_gain):
             return False
         is_rare = self.study.tail_p <= _LIMITS.gap_p
         if is_rare and best.nats / best.inflation >= _LIMITS.gap_evidence:
@@ -141,7 +144,11 @@ class LinkFamilies:
         outs = [self._without((number,)) for number in numbers]
         everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
         self._bare = self._without(numbers)
-        self.rest = Rest(everything, self._gap_gain(everything.evidences, None))
+        self.rest = Rest(
+            everything,
+            self._gap_gain(everything.evidences, None),
+            upstream_gain=_upstream_gain(likelihood),
+        )
         """Beside all accepted effects."""
         self.tests = tuple(
             self._tests(number, out, study)
@@ -240,6 +247,15 @@ class LinkFamilies:
         tangents = self._whole.tangents[:, self._found.fitted.numbers.slices[number]]
         information = tangents.T @ out.without_fixed(tangents)
         return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
+
+
+def _upstream_gain(likelihood: Likelihood) -> float:
+    """Return the power beyond noise of what the measured joints move the model by."""
+    moved = []
+    for trace in likelihood.traces:
+        inputs = replace(trace.inputs, q_act_rad=None, q_load_rad=None)
+        moved.append(trace.nominal - replace(trace, inputs=inputs).nominal)
+    return float(np.sum(likelihood.whiten(moved) ** 2))
 
 
 def _is_in(components: frozenset[int], evidence: Evidence) -> bool:

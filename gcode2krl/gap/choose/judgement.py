@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcode2krl.effects import Applied
-from gcode2krl.gap.beside.holdout import folds_of, with_rows
+from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.calibrated import probabilities_table
@@ -32,6 +32,12 @@ _LEAST_REST = 1e-6
 
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     """Examine a link on some traces and report on the held-out ones; without any, each held out in turn."""
+    judged = _judged(link, traces, held, question)
+    found = judged.examination
+    return replace(judged, examination=replace(found, data=found.data.settled()))
+
+
+def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     known = Signatures()
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
@@ -39,7 +45,7 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     every = (*traces, *held)
     if not found.causes:
         return _with_impulses(_without_causes(found, every))
-    families = LinkFamilies(found, [_certain(found, trace) for trace in every])
+    families = LinkFamilies(found, every)
     trials = list(_trials(found, held, swaps))
     counts = range(len(found.causes) + 1)
     if trials:
@@ -51,13 +57,6 @@ def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: 
     with_named = _size_with_named(judged, sizes, trials)
     judged = replace(judged, every=every, size_with_named=with_named)
     return _with_impulses(judged if judged.verdict != "explained" else _beside_its_rest(judged, whole))
-
-
-def _certain(found: Examination, trace: Trace) -> Trace:
-    """Return a trace less the rows where its model, with all that was accepted, is not known to the noise."""
-    least = np.array([noise.sigma for noise in found.noise])
-    uncertain = trace.uncertain_rows(found.applied, least)
-    return with_rows(trace, ~uncertain) if uncertain.any() else trace
 
 
 def _settled(found: Examination) -> tuple[Examination, dict[int, list[Rival]], dict[Key, Applied]]:

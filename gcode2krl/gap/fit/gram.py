@@ -75,6 +75,11 @@ class SignatureGram:
             cross[:, used.at] += own[rows].T @ used.values[rows]
         return cross
 
+    @classmethod
+    def none(cls) -> "SignatureGram":
+        """Return that of no trace."""
+        return cls([], 0, [], [])
+
     @cached_property
     def totals(self) -> list[Floats]:
         """Inner products (s + w, s + w) of signatures and nuisance of each trace."""

@@ -205,6 +205,11 @@ class Signatures:
         self._stacks[trace] = keys, stack
         return stack
 
+    def forget(self) -> None:
+        """Let go of all columns, when a link is judged; what is asked for again is made again."""
+        self._by_trace.clear()
+        self._stacks.clear()
+
     @staticmethod
     def _key(block: Block, size: float = 1.0) -> _Key:
         return (size, *block.key, tuple(sorted(block.shape.items())))

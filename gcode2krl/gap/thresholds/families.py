@@ -40,6 +40,10 @@ class FamilyThresholds:
         200.0, DEVELOPMENT, "nats over the inflation whatever the flips: in few stretches sound links have 80"
     )
 
+    form_error: float = convention(
+        0.01, "of its amplitude: no form of an effect, and no robot, is known better; less is no gap"
+    )
+
     # Names
     form_ratio: float = calibrated(
         0.85,
