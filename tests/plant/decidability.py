@@ -129,8 +129,8 @@ class Truth:
                     more.append((start, self.case.columns_of(start)))
         if not more:
             return self.case.against(self.change, self.candidates)
-        wide = self.case.and_also(more)
-        return wide.against(self.change, [b for b in wide.blocks if self._allowed(b)])
+        self.case = self.case.and_also(more)
+        return self.case.against(self.change, [b for b in self.case.blocks if self._allowed(b)])
 
     def _beside_mismatch(self, alone: Products) -> dict[tuple, np.ndarray]:
         m = alone.mismatch.at
