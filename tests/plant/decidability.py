@@ -17,7 +17,7 @@ imitator at odds of exp(D) to one. Assumptions, each of which makes D a little t
 * Effects enter by their signatures at a grid of starts (`signatures.py`); of two, the second extends one of
   the `BEAM` best singles. Of the best few the effect itself is run and, where it is not linear, refitted.
 * The truth's own model errs by a share of its change (`MODEL_ERROR`): the distance is reduced by so much.
-* What the part alone shows is no link here; its D is not known.
+* A scan of the part is no link here: where it was made D is too small, of what shows in it alone not known.
 """
 
 import argparse
@@ -31,11 +31,11 @@ import numpy as np
 
 from tests.plant import kinds
 from tests.plant.distance import Block, Fit, Products
-from tests.plant.effects import LIBRARY
+from tests.plant.effects import LIBRARY, SLIPS
 from tests.plant.faults import Fault
 from tests.plant.plans import Plan
 from tests.plant.refit import Guess
-from tests.plant.signatures import EVENTS, Library, Start
+from tests.plant.signatures import Library, Start
 from tests.plant.whitened import Case, starts_found
 
 DECIDABLE, OPEN, FAR = 10.0, 3.0, 100.0
@@ -129,8 +129,8 @@ class Truth:
                     more.append((start, self.case.columns_of(start)))
         if not more:
             return self.case.against(self.change, self.candidates)
-        wide = self.case.and_also(more)
-        return wide.against(self.change, [b for b in wide.blocks if self._allowed(b)])
+        self.case = self.case.and_also(more)
+        return self.case.against(self.change, [b for b in self.case.blocks if self._allowed(b)])
 
     def _beside_mismatch(self, alone: Products) -> dict[tuple, np.ndarray]:
         m = alone.mismatch.at
@@ -173,20 +173,19 @@ def error_of(fault: Fault) -> float:
 def of_plan(
     plan: Plan, sizes: Sequence[float], library: Library, without: Sequence[str] = ()
 ) -> list[Decidability | None]:
-    """D of each fault of a plan at its size; None of what the part alone shows, and of slips.
+    """D of each fault of a plan at its size; None of a slip, and of what no link shows but the part alone.
 
     `without`: effects that are taken out of the library.
     """
-    shown = [
-        (f.kind.signal != "scan" and f.kind.family != "set-up") or f.kind.name in EVENTS for f in plan.faults
-    ]
-    if not any(shown):
-        return [None] * len(shown)
+    is_slip = [fault.kind in SLIPS.values() for fault in plan.faults]
+    if all(is_slip):
+        return [None] * len(is_slip)
     case = Case(library, plan.how, plan.days)
-    return [
-        Truth(case, fault, size, without).decided() if seen else None
-        for fault, size, seen in zip(plan.faults, sizes, shown, strict=True)
-    ]
+    out: list[Decidability | None] = []
+    for fault, size, slips in zip(plan.faults, sizes, is_slip, strict=True):
+        truth = None if slips else Truth(case, fault, size, without)
+        out.append(None if truth is None or truth.size2 == 0.0 else truth.decided())
+    return out
 
 
 MIX = ("single", "open", "double", "single", "deleted", "open", "single", "story")

@@ -1,4 +1,4 @@
-"""Distances: closed forms of small problems, and the plant's own effects that are, or are not, the same thing."""
+"""Distances: closed forms of small problems, and the plant's own effects that are, or are not, alike."""
 
 import itertools
 
@@ -118,7 +118,7 @@ def test_a_moment_and_a_tone_are_found_in_noise():
     assert tone_of(wave, way, 3.0, 25.0) == pytest.approx(11.3, abs=0.05)
 
 
-# the plant's effects ------------------------------------------------------------------------------------------
+# the plant's effects ----------------------------------------------------------------------------------------
 
 
 def test_a_script_answers_a_builder_in_place_of_chance():
