@@ -67,17 +67,13 @@ def _alike(
         return
     less = _smaller(applied, found.traces[0].inputs)
     changes = [trace.sample((*others, less)) - trace.sample(others) for trace in found.traces]
-    small = found.likelihood.whiten(changes)
-    ends = np.cumsum([len(own) for own in signatures.columns])[:-1]
-    count = signatures.signatures
-    parts = zip(signatures.columns, np.split(small, ends), strict=True)
-    cross = np.sum([own[:, :count].T @ part for own, part in parts], axis=0)
-    gram = np.sum([total[:count, :count] for total in signatures.totals], axis=0)
-    power = max(float(small @ small), 1e-300)
+    ends = np.cumsum([change.size for change in changes])[:-1]
+    small = np.split(found.likelihood.whiten(changes)[:, None], ends)
+    gram = signatures.beside(small).total
     for column in allowed:
-        inner, along = gram[np.ix_(column.index, column.index)], cross[column.index]
-        weights = solve(inner, along[:, None])[:, 0]
-        share = float(weights @ along) / power
+        at = 1 + column.index
+        weights = solve(gram[np.ix_(at, at)], gram[at, :1])[:, 0]
+        share = float(weights @ gram[at, 0]) / max(float(gram[0, 0]), 1e-300)
         if share >= _LIMITS.twin_share:
             yield Twin(column, _start(found, column, weights / _SMALL), share)
 
