@@ -83,7 +83,8 @@ class ChooseThresholds:
         0.1, "of the mean over the root of the count: the least standard deviation of a mean square"
     )
     model_off: float = convention(
-        2.0, "times the accuracy of a model without noise: a moment that is further off is a gap, however short"
+        2.0,
+        "times the accuracy of a model without noise: a moment that is further off is a gap, however short",
     )
     model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
     observable_share: float = convention(
