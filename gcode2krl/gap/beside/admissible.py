@@ -13,6 +13,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import arm
 from gcode2krl.effects.inputs import gradient
 from gcode2krl.effects.operators import lag, play, since_reversal
+from gcode2krl.gap.beside.corners import Corners
 from gcode2krl.gap.beside.interpolation import linear, nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.units import MM_PER_M
@@ -133,6 +134,33 @@ class Admissible:
         """(n, c) of the places that were logged, the ambient last; (n, 0) without any."""
         logged = self.trace.inputs.temperature_C
         return np.zeros((len(self.trace.time_s), 0)) if logged is None else self._at(logged)
+
+    # What the controller plans
+
+    @cached_property
+    def roundings(self) -> Floats:
+        """(n, w, 6) what rounding corners over each of some widths does to the commanded joints."""
+        wide = self._corners.roundings
+        return self._at(wide.reshape(len(wide), -1)).reshape(-1, *wide.shape[1:])
+
+    @cached_property
+    def late_by_rounding(self) -> Floats:
+        """(n, 2) how late larger corners make a run, and corners passed so far."""
+        return self._at(self._corners.late_by_rounding)
+
+    @cached_property
+    def late_by_ramps(self) -> Floats:
+        """(n, 4) speed gained and lost so far, stops so far, acceleration along the path, and speed."""
+        return self._at(self._corners.late_by_ramps)
+
+    @cached_property
+    def corners_passed(self) -> Floats:
+        """(n, c) 1 from each blended corner on."""
+        return self._corners.passed[self._nearest]
+
+    @cached_property
+    def _corners(self) -> Corners:
+        return Corners(self.trace.inputs)
 
     # Joints
 

@@ -63,7 +63,7 @@ def remembered_plan(prediction: Prediction) -> RememberedPlan | None:
 
 
 def with_corners(inputs: Inputs) -> Inputs:
-    """Return the commanded inputs sampled often enough for corners of rapids, else as they are."""
+    """Return inputs sampled often enough for corners of rapids; as they are where they were moved since."""
     plan, motion, targets = inputs.plan, inputs.motion, inputs.targets
     if not isinstance(plan, RememberedPlan) or motion is None or targets is None:
         return inputs

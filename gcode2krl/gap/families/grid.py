@@ -148,6 +148,8 @@ class Grid:
                 yield from self._of_the_pose(place)
             elif place.width > 1:
                 yield from self._of_the_signal(place)
+        if self.traces[0].link.tells_time:
+            yield from self._of_the_plan(self._timing)
 
     # Functions at a place
 
@@ -279,6 +281,34 @@ class Grid:
         if used.any():
             loops = _scaled([each[:, :, used] for each in wide], sigma)
             yield Family(place, Dependence.FORCE, loops, (np.eye(loops[0].shape[2]),))
+
+    def _of_the_plan(self, place: Place) -> Iterator[Family]:
+        """Yield what a controller makes of corners, speeds and stops by laws of its own."""
+        own, at = self.inputs, list(self.traces[0].columns)
+        sigma = float(np.mean(self._sigma))
+        late, _ = place.lifted(free([each.late_by_rounding for each in own]))
+        beside = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in own]
+        yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(beside, sigma)]))
+        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in own])))
+        yield Family(place, Dependence.STOPS, *place.lifted(free(self._passed)))
+
+    @property
+    def _passed(self) -> list[Floats]:
+        """(n, c) of each trace: 1 from each blended corner on, of one program the same in all runs."""
+        programs: dict[bytes, int] = {}
+        numbers: list[int] = []
+        widths: list[int] = []
+        for each in self.inputs:
+            targets = each.trace.inputs.targets
+            key = b"" if targets is None else targets.position_mm.tobytes()
+            numbers.append(programs.setdefault(key, len(programs)))
+            if len(programs) > len(widths):
+                widths.append(each.corners_passed.shape[1])
+        firsts = np.cumsum([0, *widths])
+        columns = [np.zeros((len(each.corners_passed), firsts[-1])) for each in self.inputs]
+        for number, wide, each in zip(numbers, columns, self.inputs, strict=True):
+            wide[:, firsts[number] : firsts[number + 1]] = each.corners_passed
+        return columns
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""

@@ -138,6 +138,9 @@ class BesideThresholds:
     corner_step_s: float = physics(
         0.001, "at 0.2 m/s and 60 m/s2 across a corner of 0.5 mm samples 4 ms apart miss 0.1 mm, these 0.01"
     )
+    corner_near_mm: float = convention(
+        0.3, "a path that comes by twice passes a corner equally near to within this"
+    )
     fine_same_mm: float = convention(
         0.05, "planned anew, a prediction's samples are met to this, or its laws are others"
     )
