@@ -45,6 +45,7 @@ def _trace(link, factor=10.0, components=JOINTS, zero=0.0, left_out=()):
         run="run-1",
         left_out=left_out,
         events=(),
+        still=False,
         declared_sigma=None,
         still=False,
         shape=(4, len(components)),

@@ -46,6 +46,14 @@ def test_components_add_up():
     assert found.largest_before == pytest.approx(np.hypot(*y.T).max())
 
 
+def test_an_instrument_noisier_than_stated_is_no_gap_by_its_size():
+    y = noise(COUNT, 5, 2.0 * SIGMA)
+    stated = replace(white(1.4 * SIGMA), beyond=SIGMA * float(np.sqrt(4.0 - 1.4**2)))
+    assert size_of_gap([trace(y)], [[]], [replace(stated, beyond=0.0)], []).significant
+    assert not size_of_gap([trace(y)], [[]], [stated], []).significant
+    assert size_of_gap([trace(y + 3.0 * SINE[:, None])], [[]], [stated], []).significant
+
+
 @pytest.mark.parametrize("height", [0.4, 4.0])
 def test_the_floor_is_noise_and_the_mismatch_that_fits_best_within_its_bounds(height):
     """sqrt(sigma² + |N·b|²), at a height of 4 with b at its bound."""

@@ -17,7 +17,8 @@ def stretches_of(trace: Trace) -> Ints:
     Of a long run they are longer, so that what is kept of each does not grow with it.
     """
     since_s = trace.time_s - trace.inputs.time_s[0]
-    lasts_s = max(STRETCH_S, float(since_s[-1]) / THRESHOLDS.beside.stretches_most)
+    longest_s = (float(since_s[-1]) + 1e-6) / THRESHOLDS.beside.stretches_most
+    lasts_s = max(STRETCH_S, longest_s)
     number: Ints = (since_s / lasts_s).astype(np.int64)
     return number
 

@@ -54,7 +54,10 @@ class Size:
     freedom: float = np.inf
     """Degrees of freedom of the deviation."""
     calm_excess: float = 0.0
-    """The excess of rows that are no louder than usual: events and heavy tails are not of its test."""
+    """The excess of rows that are no louder than usual: events and heavy tails are not of its test.
+
+    Nor is what is as quick as noise and more than the stated: a finding of the instrument.
+    """
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
 
@@ -132,7 +135,7 @@ def size_of_gap(
         deviation=deviation,
         largest_before=_largest(before),
         largest_after=_largest(after),
-        calm_excess=_calm_mean_square(traces, structured, noise) - sigma2,
+        calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
     )

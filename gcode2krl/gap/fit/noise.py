@@ -57,6 +57,8 @@ class Noise:
     scale: float
     short_sigma: float
     slow: tuple[Slow, ...] = ()
+    beyond: float = 0.0
+    """What of the short part's rms is beyond what is stated, and not in it."""
 
     @property
     def sigma(self) -> float:
@@ -216,9 +218,13 @@ def drawn_slow(slow: Slow, count: int, generator: np.random.Generator) -> Floats
 def at_most(noise: Noise, sigma: float) -> Noise:
     """Return a model whose short part has no more than this rms, white where it was larger.
 
-    The rest is structure. What an instrument states is its short noise: the slow part has a bound of its own.
+    The rest may be structure, which families find; its size alone is a noisy instrument (`Noise.beyond`).
+    What an instrument states is its short noise: the slow part has a bound of its own.
     """
-    short = noise if noise.short_sigma <= sigma else replace(white(sigma), slow=noise.slow)
+    short = noise
+    if noise.short_sigma > sigma:
+        beyond = float(np.sqrt(noise.short_sigma**2 - sigma**2))
+        short = replace(white(sigma), slow=noise.slow, beyond=beyond)
     most = _LIMITS.noise_most_slow * short.short_sigma
     return replace(short, slow=tuple(replace(each, sigma=min(each.sigma, most)) for each in short.slow))
 
