@@ -47,7 +47,6 @@ def _trace(link, factor=10.0, components=JOINTS, zero=0.0, left_out=()):
         events=(),
         still=False,
         declared_sigma=None,
-        still=False,
         shape=(4, len(components)),
         link=link,
         signal=link.signal,
