@@ -182,6 +182,7 @@ def test_the_json_has_every_key_and_plain_values():
         "max_after",
         "shrink",
         "held_out",
+        "per_run",
     }
     assert set(found["where"]) == {
         "signals",
