@@ -14,6 +14,8 @@ from gcode2krl.gap.beside.poses import is_of_poses
 from gcode2krl.gap.fit.pose_noise import noise_of_poses, revisits
 from gcode2krl.runs import load_run
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 COVERS = ("gcode2krl.gap.fit.pose_noise",)
 
 CELL = load_cell()
