@@ -7,6 +7,8 @@ import pytest
 
 from tests.conftest import ROOT
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 EXAMPLES = ROOT / "examples"
 SLOT = """G21 G90 G17 G40 G49 G80 G94 G54
 T1 M6

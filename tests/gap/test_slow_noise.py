@@ -6,6 +6,8 @@ import pytest
 from gcode2krl.gap.fit.noise import Slow, drawn_slow
 from gcode2krl.gap.fit.slow_noise import BlockMeans, slow_parts_of
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 STEP_S = 0.05
 COUNT, RUNS = 300, 3
 TIME_S = STEP_S * np.arange(COUNT)

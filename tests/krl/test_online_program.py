@@ -16,6 +16,8 @@ from tests.krl.test_pilot_program import predicted
 from tests.krl.test_verify import change, delete, errors, insert, motions_of, tampered
 from tests.krl.test_write import long_part
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 ADDRESS = {"online": {"link": {"address": "192.168.7.3"}}}
 HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54 G64 P0.02\nT1 M6\nS8000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\n"
 CUT = "G0 Z2\nG1 Z-2 F600\nG1 X40 F1500\nG1 Y30.5\nG1 X0 Y20\nG0 Z20\n"

@@ -6,6 +6,8 @@ import pytest
 
 from gcode2krl import verify_krl
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 HEAD = (
     "G21 G90 G17 G54 G64 P0.02\nT1 M6\nS8000 M3\n{coolant}"
     "G0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\nG1 Z-1 F600\nG1 X20\n"

@@ -11,6 +11,8 @@ from gcode2krl import load_cell, read_gcode, set_targets, solve_joints, write_kr
 from gcode2krl.cell import resolve_cell
 from tests.krl.replay import Kr300, frame, read_program, replay_joints
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
 THINNED = {"raster_finish": 10}
 POSITION_MM, ROTATION_DEG, FEED_MM_MIN, JOINT_DEG = 0.002, 0.001, 0.1, 0.01

@@ -10,6 +10,8 @@ from gcode2krl.krl import write_krl
 from gcode2krl.pipeline import predict_toolpath
 from tests.krl.test_verify import ZIGZAG, errors
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 
 def check(made, src=None):
     return verify_krl(src or made.src, made.toolpath, made.cell)

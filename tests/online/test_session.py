@@ -14,6 +14,8 @@ from gcode2krl.pilot import Knots, PilotHeader
 from tests.online.conftest import Log, talk
 from tests.online.krc import Krc
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 SIDE = np.array([0.0, 300.0, -50.0, 0.0, 0.0, 0.0])
 PROOF = 60
 """Cycles after which corrections are made."""

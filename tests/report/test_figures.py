@@ -31,6 +31,8 @@ from tests.report.scenes import (
     toolpath_of,
 )
 
+pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+
 
 @pytest.fixture(scope="module")
 def dog_leg():
