@@ -61,6 +61,9 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
         "--baselines", type=int, default=5, metavar="N", help="simple methods on every N-th case; 0: none"
     )
     parser.add_argument("--no-baselines", dest="baselines", action="store_const", const=0)
+    parser.add_argument(
+        "--decide", action="store_true", help="how far each truth is from its imitators, stored records too"
+    )
     parser.add_argument("--only-report", action="store_true", help="tables of what is there, of any code")
     parser.add_argument("--json", action="store_true", help="the judgements, a line each")
     parser.add_argument("--timing", action="store_true", help="how long three runs of 60 s take")
@@ -126,9 +129,23 @@ def _records(
             store(record, folder)
             records.append(record)
             _tell(record, f"{i + 1}/{len(left)}")
+    if options.decide:
+        records = _decided(records, folder, options.jobs, until_s)
     asked = Asked(options.next, options.next_beside, options.jobs, until_s, options.only_report)
     driven = next_records(records, folder, how.code, asked)
     return records, driven
+
+
+def _decided(records: list[dict[str, Any]], folder: Path, jobs: int, until_s: float) -> list[dict[str, Any]]:
+    """Return the records, all with distances, and store those that are new."""
+    from gap_blind_decided import decide
+
+    fresh = {}
+    for record in decide(records, folder / "signatures", jobs, until_s):
+        store(record, folder)
+        fresh[record["case"]["kind"], record["case"]["seed"]] = record
+    say(f"{len(fresh)} cases decided")
+    return [fresh.get((each["case"]["kind"], each["case"]["seed"]), each) for each in records]
 
 
 def _tell(record: dict[str, Any], count: str) -> None:

@@ -20,18 +20,22 @@ from gcode2krl.effects import library  # noqa: E402
 from tests.plant.cases import has_other_form  # noqa: E402
 from tests.plant.confounded import PAIRS  # noqa: E402
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN  # noqa: E402
+from tests.plant.kinds import STORIES  # noqa: E402
 from tests.plant.scene import CELL_TOML  # noqa: E402
 from tests.plant.waypoints import PROGRAMS  # noqa: E402
 
 SCORED_FROM = 30_000
 BLOCK = 1_000
 NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
-KINDS = ("null", "single", "slip", "open", "pair", "deleted", *NULLS[1:], "confounded", "missing")
+KINDS = ("null", "single", "slip", "open", "pair", "deleted", *NULLS[1:], "confounded", "missing", "story")
 """The n-th kind has the n-th block of seeds."""
 MIXED = {"null": 0.12, "single": 0.40, "slip": 0.06, "open": 0.12, "pair": 0.07, "deleted": 0.08}
 MIXED |= {"null_foreign_noise": 0.05, "null_foreign_mismatch": 0.04, "confounded": 0.03, "missing": 0.03}
+MIXED |= {"story": 0.02}
 FULL = {"null": 300, "null_foreign_noise": 100, "null_foreign_mismatch": 100, "single": 600, "pair": 220}
-FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60}
+FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60, "story": 60}
+ALIKE = ("servo_lag", "dead_time", "servo_gain", "backlash")
+"""Effects that six synchronised servos or gears have alike: asked for at target `all` too."""
 DELETED_EACH = 10
 """Cases of each effect with that effect taken out of the library."""
 OTHER_IN_FIVE = 2
@@ -56,24 +60,49 @@ class Case:
         return f"{self.kind}-{self.seed:05d}"
 
 
+OTHER_NUMBERS = frozenset(
+    {
+        "axis_coupling",
+        "bearing_wobble",
+        "belt_wind_up",
+        "bolt_ratchet",
+        "collision",
+        "current_limit",
+        "dead_time",
+        "floor_vibration",
+        "force_hysteresis",
+        "force_steps",
+        "jerk_feed_forward",
+        "servo_gain",
+        "spindle_droop",
+    }
+)
+"""The plant states these by other numbers or targets than the library: a name could not be scored."""
+
+
 def simulated() -> list[str]:
     """Return every effect of the library that the plant can do; slips are no effects of the robot."""
-    return sorted(name for name, effect in library().items() if effect.kind != "slip" and name in LIBRARY)
+    return sorted(name for name in _effects() if name in LIBRARY and name not in OTHER_NUMBERS)
 
 
 def not_simulated() -> list[str]:
-    """Return the effects of the library that the plant cannot do, so that they are never asked for."""
-    return sorted(name for name, effect in library().items() if effect.kind != "slip" and name not in LIBRARY)
+    """Return the effects of the library that are never asked for: the plant lacks them or their numbers."""
+    return sorted(name for name in _effects() if name not in LIBRARY or name in OTHER_NUMBERS)
+
+
+def _effects() -> list[str]:
+    return [name for name, effect in library().items() if effect.kind != "slip"]
 
 
 def shelves() -> dict[str, list[str]]:
     """Return what each kind takes in turn; the plant draws for kinds that are not here."""
     return {
-        "single": simulated(),
+        "single": [*simulated(), *(f"{name}@all" for name in simulated() if name in ALIKE)],
         "slip": sorted(SLIPS),
         "open": [f"open:{name}" for name in sorted(set(UNKNOWN) - set(library()))],
         "deleted": simulated(),
         "confounded": sorted(PAIRS),
+        "story": sorted(STORIES),
     }
 
 

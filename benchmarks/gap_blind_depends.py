@@ -1,6 +1,6 @@
 """Whether an answer says where a gap sits and on what it depends, as the label has it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,8 @@ STATED = 0.5
 """Probability from which on a dependence counts as stated."""
 AXES = frozenset({"fx", "fy", "fz", "force"})
 JOINTS = frozenset({"A1", "A2", "A3", "A4", "A5", "A6"})
+ALL = "all"
+"""``target`` of a label, and ``at`` of an answer, of what errs alike in all joints."""
 TIMING = "timing"
 """``at`` of what moves all joints along the path, and of the links that see it."""
 PLACES = {"tip": {"tip"}, "force": AXES, "part": {"tip", "part"}, "clock": {"tip", TIMING} | AXES | JOINTS}
@@ -22,6 +24,7 @@ INPUTS = {
     "time_since_start": {"time since the run's start"},
     "own_torque_memory": {"own torque"},
     "force_memory": {"force"},
+    "jerk": {"jerk", "acceleration"},
 }
 """Input in the words of a label -> ``on``; the others differ by their spaces alone."""
 
@@ -73,6 +76,23 @@ def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
     return _compared(max(stated, key=lambda each: each.probability), allowed) if stated else NOTHING
 
 
+def located(entries: Sequence[dict[str, Any]], result: dict[str, Any]) -> bool:
+    """Tell whether each true effect has a statement of its own, of a cause or of the rest, with its place."""
+    stated = [*_of_causes(named_of(result)), *_of_rest(result)]
+    places = [each.at for each in stated if each.probability >= STATED]
+    allowed = [allowed_by(entry) for entry in entries]
+    return bool(allowed) and all(allowed) and _each_has_its_own([a.at for a in allowed if a], places)
+
+
+def _each_has_its_own(allowed: Sequence[frozenset[str]], places: Sequence[str]) -> bool:
+    if not allowed:
+        return True
+    return any(
+        place in allowed[0] and _each_has_its_own(allowed[1:], [*places[:i], *places[i + 1 :]])
+        for i, place in enumerate(places)
+    )
+
+
 def probabilities(entry: dict[str, Any], result: dict[str, Any]) -> list[tuple[float, bool]]:
     """Return the probability of each dependence of the rest, and whether place and input are right."""
     allowed = allowed_by(entry)
@@ -92,6 +112,8 @@ def allowed_by(entry: dict[str, Any]) -> Allowed | None:
     if not depends:
         return None
     places = set(depends["joints"]) if depends["where"] == "joint" else PLACES[depends["where"]]
+    if depends.get("target") == ALL:
+        places = {ALL, TIMING}
     if TIMING in depends.get("links", ()):
         places = places | {TIMING}
     inputs = {word for on in depends["on"] for word in INPUTS.get(on, {on.replace("_", " ")})}

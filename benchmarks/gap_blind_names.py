@@ -16,8 +16,17 @@ def named_of(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def names(cause: dict[str, Any], truth: Truth) -> bool:
-    """Tell whether a cause, or a member of its set, is this effect at this target."""
-    return cause["effect"] == truth[0] and (cause["target"] == truth[1] or truth[0] in ANY_TARGET)
+    """Tell whether a cause, or one of the members of a group, is this effect at this target."""
+    if any(names(member, truth) for member in cause.get("members") or ()):
+        return True
+    if cause.get("effect") != truth[0]:  # an unknown in a set has none
+        return False
+    return cause.get("target") == truth[1] or truth[0] in ANY_TARGET
+
+
+def effects_alike(cause: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the effects of the library that a cause declares indistinguishable from it."""
+    return [each for each in cause.get("indistinguishable_from") or () if each.get("kind") != "unknown"]
 
 
 def declares(cause: dict[str, Any], truth: Truth) -> bool:

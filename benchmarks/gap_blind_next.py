@@ -19,7 +19,7 @@ import numpy as np
 from gap_blind_canned import AGAIN, NotCannedError, names, predicted
 from gap_blind_cases import Case, predictions
 from gap_blind_figures import rate
-from gap_blind_names import Truth, named_of
+from gap_blind_names import Truth, effects_alike, named_of
 from gap_blind_names import names as says
 from gap_blind_run import answer, made
 from gap_blind_score import judge
@@ -78,7 +78,7 @@ def is_settled(result: dict[str, Any], truth: Truth) -> bool:
     named = named_of(result)
     if len(named) != 1:
         return False
-    said = [named[0], *(named[0].get("indistinguishable_from") or ())]
+    said = [named[0], *effects_alike(named[0])]
     allowed = (truth, *SAME.get(truth, ()))
     return any(says(each, truth) for each in said) and all(
         any(says(each, one) for one in allowed) for each in said
@@ -191,9 +191,7 @@ def _one_way(
         found["settled"] = is_settled(after, truth)
         found["named"] = [f"{each['effect']} {each['target']}" for each in named_of(after)]
         found["left"] = [
-            f"{one['effect']} {one['target']}"
-            for each in named_of(after)
-            for one in each.get("indistinguishable_from") or ()
+            f"{one['effect']} {one['target']}" for each in named_of(after) for one in effects_alike(each)
         ]
     except NotCannedError as error:
         found["skipped"] = str(error)

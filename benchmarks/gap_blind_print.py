@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from gap_blind_cases import full_counts, not_simulated
+from gap_blind_classes import CLASSES, class_rows
 from gap_blind_figures import Rate, grouped, rate, smallest_seen
 from gap_blind_next import cost as next_cost
 from gap_blind_next import rows as next_rows
@@ -22,6 +23,11 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
     """Return all tables as text; ``driven``: the records of the next runs."""
     rows = [(row.metric, row.figure, row.worst, row.aim) for row in metrics(cases)]
     parts = [title, table(("metric", "figure (95 % bound)", "worst", "aim"), rows)]
+    if any(each.nats is not None for each in cases):
+        parts += [
+            "By class of decidability (two effects of the library as imitators; docs/diagnose_check.md):"
+        ]
+        parts += [table(("metric", *CLASSES), class_rows(cases))]
     if foreign := [each for each in cases if not each.truths and each.foreign]:
         parts += ["False alarms by what is foreign (a case counts for each noise that it has):"]
         parts += [_by_foreign(foreign)]

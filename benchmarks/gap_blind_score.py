@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gap_blind_depends import Told, told
+from gap_blind_depends import Told, located, told
 from gap_blind_depends import probabilities as depends_probabilities
+from gap_blind_moments import moment_hit
 from gap_blind_names import Truth, covers, declares, is_among, named_of, names, text
 from gap_blind_numbers import numbers
 from gap_blind_places import NOISE, OWN, overlap, worst_of
 from gap_blind_tests import Tested, tested_of
 from gap_blind_words import truth_of
+
+from tests.plant.decidability import DECIDABLE, class_of
 
 UNKNOWN = ("unexplained", "partly_explained")
 NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
@@ -77,6 +80,14 @@ class Judged:
     has_rest: bool = False
     """What is left is significant."""
     told: Told | None = None
+    located: bool = False
+    """Each truth has a statement of its own with its place."""
+    moment: bool | None = None
+    """A moment that is told is one of the truth's, to 20 ms; None where the truth has none."""
+    nats: float | None = None
+    """Distance of the least decidable effect from its best imitators; None where it is not known."""
+    gap_nats: float | None = None
+    """The same beside mismatch alone."""
     tested: tuple[Tested, ...] = ()
     next_program: str | None = None
     shrink: float | None = None
@@ -94,6 +105,18 @@ class Judged:
     def decidable(self) -> bool:
         """Tell whether mismatch leaves as much as the noise of it, and no simple effect fits it."""
         return self.beyond >= 1.0 and not self.is_imitated
+
+    @property
+    def decidability(self) -> str:
+        """Return the class of the case; empty without an effect."""
+        if not self.truths:
+            return ""
+        return "not known" if self.nats is None else class_of(self.nats)
+
+    @property
+    def is_plain(self) -> bool:
+        """Tell whether mismatch is too far from the truth to explain it away."""
+        return self.gap_nats is not None and self.gap_nats >= DECIDABLE
 
     @property
     def flagged(self) -> bool:
@@ -126,6 +149,21 @@ def _beyond(entry: dict[str, Any]) -> float:
     return float(entry["ratio"] if left is None else left)
 
 
+def _known(entries: list[dict[str, Any]], which: str) -> list[float] | None:
+    found = [(entry.get("nats") or {}).get(which) for entry in entries]
+    return None if not found or any(each is None for each in found) else [float(each) for each in found]
+
+
+def _least(entries: list[dict[str, Any]], which: str) -> float | None:
+    known = _known(entries, which)
+    return None if known is None else min(known)
+
+
+def _most(entries: list[dict[str, Any]], which: str) -> float | None:
+    known = _known(entries, which)
+    return None if known is None else max(known)
+
+
 def judge(record: dict[str, Any]) -> Judged:
     """Return the judgement of a record; one without a result counts as wrong."""
     label, case, result = record["label"], record["case"], record.get("result")
@@ -148,6 +186,8 @@ def judge(record: dict[str, Any]) -> Judged:
         plant_cpu_s=record.get("plant_cpu_s", 0.0),
         beside_cpu_s=record.get("beside_cpu_s", 0.0),
         foreign=_foreign(label),
+        nats=_least(entries, "two"),
+        gap_nats=_most(entries, "mismatch"),
         failed=record.get("error") is not None,
         baselines=_baselines(record, truths),
         **known,
@@ -182,6 +222,8 @@ def _answered(
         "tested": tested_of(result, right),
         "has_rest": bool(result["unexplained"].get("significant")),
         "next_program": (result.get("next_run") or {}).get("program"),
+        "located": located(entries, result),
+        "moment": moment_hit(entries, result),
     }
     return found | (_one_effect(kind, entries[0], record) if len(entries) == 1 else {})
 

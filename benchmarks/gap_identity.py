@@ -37,7 +37,7 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
 
     make = commands.add_parser("make", help="store cases: predictions and run folders")
     make.add_argument("folder", type=Path)
-    make.add_argument("--cases", type=int, default=72)
+    make.add_argument("--cases", type=int, default=86)
     make.add_argument("--seed", type=int, default=3001, help="of the first case")
 
     run = commands.add_parser("run", help="diagnose the stored cases by the code on PYTHONPATH")

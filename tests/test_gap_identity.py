@@ -134,7 +134,7 @@ def test_records_are_compared_and_no_output(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_every_effect_and_slip_is_among_the_stored_cases() -> None:
-    whole = cases.wanted(72)
+    whole = cases.wanted(86)
     assert {each.effect for each in whole} >= {*cases.LIBRARY, *cases.SLIPS}
     kinds = [each.kind for each in whole]
     assert {kind: kinds.count(kind) for kind in ("null", "open", "pair", "deleted", "log", "blind")} == {
@@ -148,7 +148,7 @@ def test_every_effect_and_slip_is_among_the_stored_cases() -> None:
     assert sum(each.holdout for each in whole) >= 10
     assert sum(each.apply for each in whole) >= 4
     assert len({each.kind for each in whole[::5]}) >= 5  # a part has some of each
-    assert cases.wanted(76)[72:] == whole[:4]
+    assert cases.wanted(90)[86:] == whole[:4]
     assert len(set(cases.wanted(12))) == 12
 
 

@@ -30,6 +30,8 @@ Target = str | None
 
 LINKS = ("timing", "path", "servo", "gear", "force", "mechanics", "part")
 JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
+ALL = "all"
+"""The target of a common-mode effect: one number that all six joints have, as servos tuned alike do."""
 NO_TARGET: tuple[Target, ...] = (None,)
 _DOWNSTREAM = {
     "timing": "path",
@@ -84,6 +86,11 @@ class Applied:
     def joint(self) -> int:
         """Return the index 0 to 5 of the target A1 to A6."""
         return JOINTS.index(self.target or "")
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Return the indices 0 to 5 of the joints at the target: all six where it is `ALL`."""
+        return tuple(range(len(JOINTS))) if self.target == ALL else (self.joint,)
 
 
 class Effect:
@@ -195,7 +202,7 @@ class Effect:
 
         It goes down the chain from its own links to the first where measured joints replace the model's.
         """
-        if not self.is_nuisance:
+        if not self.is_nuisance or target == ALL:  # that of each joint already stands for what they share
             return
         for link in sorted(self.links_at(target)):
             here: str | None = link
@@ -364,6 +371,11 @@ class Effect:
 def every_joint(cell: Cell) -> tuple[Target, ...]:
     """Return A1 to A6."""
     return JOINTS
+
+
+def every_joint_and_all(cell: Cell) -> tuple[Target, ...]:
+    """Return A1 to A6, and all of them with one number."""
+    return (*JOINTS, ALL)
 
 
 def every_virtual_joint(cell: Cell) -> tuple[Target, ...]:

@@ -1,4 +1,4 @@
-"""Operators with memory along time: play, first-order lag, second-order mode, reversals; compiled."""
+"""Operators with memory along time: play, lag, second-order mode, limited drive, reversals; compiled."""
 
 import math
 
@@ -10,6 +10,7 @@ from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 _play = core_function("effects_play", FLOATS, FLOAT, OUT_FLOATS)
 _lag = core_function("effects_lag", FLOATS, FLOATS, FLOAT, OUT_FLOATS)
 _second_order = core_function("effects_second_order", FLOATS, FLOATS, FLOAT, FLOAT, OUT_FLOATS)
+_limited = core_function("effects_limited", FLOATS, FLOATS, FLOAT, FLOAT, OUT_FLOATS)
 _since_reversal = core_function("effects_since_reversal", FLOATS, FLOATS, OUT_FLOATS, OUT_FLOATS)
 
 
@@ -46,6 +47,18 @@ def second_order(values: Floats, time_s: Floats, hz: float, damping: float) -> F
     values = _column(values)
     out = np.empty_like(values)
     _second_order(values, _column(time_s), 2.0 * math.pi * hz, damping, out)
+    return out
+
+
+def limited(values: Floats, time_s: Floats, limit: float, k_v_per_s: float) -> Floats:
+    """Return what follows (m,) with an acceleration of at most ``limit``, the values themselves within it.
+
+    It begins with what is commanded. Beyond the limit it falls behind; a critically damped loop on distance
+    and speed brings it back, at a speed that a fifth of the limit can brake.
+    """
+    values = _column(values)
+    out = np.empty_like(values)
+    _limited(values, _column(time_s), max(limit, 0.0), k_v_per_s, out)
     return out
 
 

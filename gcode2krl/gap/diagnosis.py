@@ -1,6 +1,6 @@
 """The diagnosis: runs beside their predictions, link by link, to one answer."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import input_error
-from gcode2krl.gap.beside.bursts import without_bursts
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
+from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING
+from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.choose.candidates import question_of
@@ -107,13 +107,14 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     if set_up.is_final:
         return answer(context, slips, issues)
     context = _with_data(with_controller_clocks(context, PATH))
+    rough = _rough(context)
     links = begin("links")
     for count, link in enumerate(SIGNALS):
         links(count, len(SIGNALS))
         traces = link.traces(context.pairs, link.base(context))
         if traces:
-            explain, held = split(traces, context.explaining)
-            explain, held = (without_hum(without_bursts(each)) for each in (explain, held))
+            calm = without_hum(sorted_out(traces, _elsewhere(rough, link)))
+            explain, held = split(calm, context.explaining)
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
     begin("part and answer")
@@ -121,6 +122,25 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     if surface is not None:
         context = context.with_judgement(surface)
     return answer(context, slips, issues)
+
+
+def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:
+    """Return of each table and run the times at which it is rough, of links that are measured directly."""
+    rough: dict[str, dict[str, list[Span]]] = {}
+    for link in SIGNALS:
+        traces = link.traces(context.pairs, link.base(context))
+        for run, spans in rough_spans(traces).items():
+            rough.setdefault(link.table, {}).setdefault(run, []).extend(spans)
+    return rough
+
+
+def _elsewhere(rough: Mapping[str, Mapping[str, Sequence[Span]]], link: Link) -> dict[str, list[Span]]:
+    """Return of each run the times at which tables other than a link's own are rough."""
+    others: dict[str, list[Span]] = {}
+    for table, runs in rough.items():
+        for run, spans in runs.items() if table != link.table else ():
+            others.setdefault(run, []).extend(spans)
+    return others
 
 
 def _with_data(context: Context) -> Context:

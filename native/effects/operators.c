@@ -1,4 +1,4 @@
-/* Operators with memory along time: play, first-order lag, second-order mode, reversals (effects/operators.py). */
+/* Operators with memory along time: play, lag, second-order mode, limited drive, reversals (effects/operators.py). */
 
 #include "core.h"
 
@@ -38,6 +38,46 @@ EXPORT void effects_lag(Floats values, Floats time_s, double tau_s, Floats out) 
             behind = behind * kept - before * gone - (slope - before) * (tau_s - tau_s * gone / dt);
         }
         AT(out, i) = AT(values, i) + behind;
+    }
+}
+
+/* Return the second derivative at a sample: that of the parabola through it and its neighbours, 0 at the ends. */
+static double bend_at(Floats values, Floats time_s, int64_t i) {
+    if (i < 1 || i + 1 >= values.rows)
+        return 0.0;
+    const double before = AT(time_s, i) - AT(time_s, i - 1), after = AT(time_s, i + 1) - AT(time_s, i);
+    if (!(before > 0.0 && after > 0.0))
+        return 0.0;
+    const double rise = (AT(values, i + 1) - AT(values, i)) / after;
+    return 2.0 * (rise - (AT(values, i) - AT(values, i - 1)) / before) / (before + after);
+}
+
+/* Of a loop's time constant, a step of its integration at most. */
+static const double SHORT_STEP = 0.1;
+/* Of the limit, what is kept for braking while it catches up: the rest the command may take. */
+static const double KEPT = 0.2;
+
+/* Write what follows values (m) with an acceleration within ± limit; w is the gain of the loop.
+
+What is integrated is the distance behind: it stays exactly 0 as long as nothing is cut off. A speed of w/2
+times the distance is critically damped; without the second bound, sqrt(2·a·distance), a loop at its limit
+would not brake in time and swing ever further. */
+EXPORT void effects_limited(Floats values, Floats time_s, double limit, double w, Floats out) {
+    double behind = 0.0, speed = 0.0, wanted = 0.0;
+    for (int64_t i = 0; i < values.rows; i++) {
+        const double before = wanted, dt = i > 0 ? AT(time_s, i) - AT(time_s, i - 1) : 0.0;
+        wanted = bend_at(values, time_s, i);
+        const int64_t steps = 1 + (int64_t)lesser(dt * w / SHORT_STEP, 1e4);
+        const double step = dt / (double)steps;
+        for (int64_t k = 0; k < steps && dt > 0.0; k++) {
+            const double demanded = before + (wanted - before) * ((double)k + 0.5) / (double)steps;
+            const double distance = fabs(behind);
+            const double back = lesser(w / 2.0 * distance, sqrt(2.0 * KEPT * limit * distance));
+            const double asked = demanded + 2.0 * w * (speed + (behind < 0.0 ? -back : back));
+            speed += step * (demanded - greater(lesser(asked, limit), -limit));
+            behind += step * speed;
+        }
+        AT(out, i) = AT(values, i) - behind;
     }
 }
 

@@ -237,3 +237,79 @@ def test_the_material_is_removed_once(part):
     for cell in (part.cell, edges(part.cell, Kte=2.0), part.cell):
         few(part.motion, cell)
     assert len(calls) == 6
+
+
+def test_a_collision_is_half_a_sine_that_bends_the_arm(swinging, known):
+    """2 kN for 50 ms, its impulse 2·T/pi·F whatever the samples, in the run of its time and in no other."""
+    for hours, at_s in ((0.0, 8.003), (0.5, 1808.003)):
+        inputs = replace(swinging, hours=hours)
+        text = f"collision:at_s={at_s},size_N=2000,lasts_s=0.05,direction=0/0/-3"
+        signals = run(inputs, known, text)
+        push = signals.force_meas_base_N - inputs.force_base_N
+        assert not push[:, :2].any()
+        t = inputs.time_s
+        assert not push[(t < 7.99) | (t > 8.066)].any()
+        assert push[:, 2].min() < -1900.0
+        assert np.sum(push[:, 2]) * 0.012 == pytest.approx(-2000.0 * 2.0 * 0.05 / np.pi, rel=1e-9)
+        pushed = simulate(replace(inputs, load_base_N=inputs.force_base_N + push))
+        np.testing.assert_allclose(signals.tcp_base_mm, pushed.tcp_base_mm, atol=1e-9)
+    elsewhere = run(replace(swinging, hours=0.25), known, text)
+    np.testing.assert_array_equal(elsewhere.force_meas_base_N, swinging.force_base_N)
+
+
+def test_a_collision_leaves_a_step_where_one_is_stated(swinging, known):
+    texts = ("collision:at_s=8,size_N=1150,direction=1/0/0", "step:target=A2,at_s=8,size_deg=0.0225")
+    signals = run(swinging, known, *texts)
+    later = swinging.time_s > 8.2
+    np.testing.assert_allclose(
+        (signals.q_load_rad - swinging.q_cmd_rad)[later, 1], 0.0225 * np.pi / 180.0, atol=1e-12
+    )
+    np.testing.assert_array_equal(signals.force_base_N[later], swinging.force_base_N[later])
+
+
+def test_a_spindle_that_droops_cuts_thicker_chips(part, milling, known):
+    """The material removed again with every sample's own speed, by the law at the thicker chip."""
+    signals = run(milling, known, "spindle_droop:percent_per_Nm=8")
+    torque = part.forces.torque_Nmm / 1000.0
+    cuts = part.forces.force_base_N.any(axis=1)
+    assert torque.max() > 0.3
+    # of a linear edge law the part that goes with the chip grows by 1/(1 - droop), the edge force does not
+    edge = np.array(milling.recut(edges(part.cell, Ktc=0.0, Krc=0.0, Kac=0.0))[0])
+    share = (1.0 - 0.08 * torque)[:, None]
+    wanted = edge + (part.forces.force_base_N - edge) / share
+    np.testing.assert_allclose(
+        signals.force_base_N[cuts], wanted[cuts], atol=0.02 * np.abs(part.forces.force_base_N).max()
+    )
+    more = np.linalg.norm(signals.force_base_N - part.forces.force_base_N, axis=1)
+    told = np.linalg.norm(wanted - part.forces.force_base_N, axis=1)
+    assert more[cuts].sum() == pytest.approx(told[cuts].sum(), rel=0.03)
+    np.testing.assert_array_equal(signals.force_base_N[~cuts], part.forces.force_base_N[~cuts])
+    with pytest.raises(NotUnderstoodError, match="allowed: 0 or more"):
+        parse("spindle_droop:percent_per_Nm=-1", known, part.cell)
+
+
+def test_a_sensor_reads_more_on_the_way_back(swinging, known):
+    """Up to ± 400 N and back: without a load it reads 1 % of that too much, or too little."""
+    t = swinging.time_s
+    up = np.interp(t, [0.0, 4.0, 8.0, 12.0, 16.0], [0.0, 400.0, 0.0, -400.0, 0.0])
+    turned = np.einsum("nij,j->ni", swinging.sensor_rotation, [0.0, 1.0, 0.0]) * up[:, None]
+    inputs = replace(swinging, force_base_N=turned)
+    signals = run(inputs, known, "force_hysteresis:loss_percent=2")
+    seen = np.einsum("nji,nj->ni", inputs.sensor_rotation, signals.force_meas_base_N)
+    np.testing.assert_allclose(seen[:, [0, 2]], 0.0, atol=1e-9)
+    lost = up - seen[:, 1]
+    assert np.interp(3.0, t, lost) == pytest.approx(4.0, abs=0.05)  # the play is 200 N behind
+    assert np.interp(8.0, t, lost) == pytest.approx(-4.0, abs=0.05)
+    assert np.interp(16.0, t, lost) == pytest.approx(4.0, abs=0.05)
+    assert np.ptp(lost) == pytest.approx(0.02 * 400.0, rel=0.01)
+    np.testing.assert_array_equal(signals.force_base_N, turned)
+
+
+def test_a_reading_in_steps_is_the_nearest_one(swinging, known):
+    signals = run(swinging, known, "force_steps:step_N=20")
+    seen = np.einsum("nji,nj->ni", swinging.sensor_rotation, signals.force_meas_base_N)
+    true = np.einsum("nji,nj->ni", swinging.sensor_rotation, swinging.force_base_N)
+    np.testing.assert_allclose(seen / 20.0, np.round(true / 20.0), atol=1e-9)
+    rows = np.abs(true).max(axis=1) > 60.0
+    assert np.sqrt(np.mean((seen - true)[rows] ** 2)) == pytest.approx(20.0 / np.sqrt(12.0), rel=0.1)
+    assert not known["force_steps"].searched("force", None, frozenset({"force"}))

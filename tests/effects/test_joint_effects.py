@@ -2,6 +2,7 @@
 
 import io
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -202,3 +203,95 @@ def test_advance_stop(milling, known):
     assert signals.time_s[-1] - milling.time_s[-1] > 1.0
     none = run(milling, known, "advance_stop:count=0,hold_s=0.5")
     assert none.inputs is milling
+
+
+def ramps(inputs, acceleration, run_s=0.4, pause_s=1.2):
+    """A2 of a run that is sped up, slowed down, and rests, over and over."""
+    t = inputs.time_s
+    phase = t % (2.0 * run_s + pause_s)
+    wanted = np.where(phase < run_s, acceleration, np.where(phase < 2.0 * run_s, -acceleration, 0.0))
+    step = np.diff(t, prepend=t[:1])
+    q = np.array(inputs.q_cmd_rad)
+    q[:, 1] = -1.7 + np.cumsum(np.cumsum(wanted * step) * step)
+    return replace(inputs, q_cmd_rad=q)
+
+
+def test_a_drive_at_its_limit_falls_behind_and_catches_up(swinging, known):
+    """Two thirds of the acceleration of a ramp: behind by a sixth of a·t², and there within a second."""
+    inputs = ramps(swinging, 1.5)
+    limit = 1.0 / DEG
+    signals = run(inputs, known, f"current_limit:target=A2,limit_deg_s2={limit}")
+    behind = (inputs.q_cmd_rad - signals.q_act_rad)[:, 1]
+    period = inputs.time_s % 2.0
+    first = (period > 0.05) & (period < 0.39)
+    np.testing.assert_allclose(behind[first], 0.25 * period[first] ** 2, rtol=0.1, atol=1e-3)
+    assert 0.03 < behind.max() < 0.12
+    settled = (period > 1.9) | (inputs.time_s < 0.012)
+    assert np.abs(behind[settled]).max() < 0.02 * behind.max()
+    taken = np.gradient(np.gradient(signals.q_act_rad[:, 1], inputs.time_s), inputs.time_s)
+    assert np.abs(taken[first & (period < 0.36)]).max() < 1.01
+    others = [0, 2, 3, 4, 5]
+    np.testing.assert_array_equal(signals.q_act_rad[:, others], inputs.q_cmd_rad[:, others])
+
+
+def test_a_limit_that_the_run_keeps_takes_nothing(swinging, known):
+    effect = known["current_limit"]
+    own = effect.nominal(swinging, "A2")["limit_deg_s2"]
+    for limit in (own, 2.0 * own):
+        signals = run(swinging, known, f"current_limit:target=A2,limit_deg_s2={limit}")
+        np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
+    assert effect.start(swinging, "A2")["limit_deg_s2"] == pytest.approx(0.8 * own)
+
+
+def test_a2_turns_a3(swinging, known):
+    signals = run(swinging, known, "axis_coupling:ratio=0.002,deg_per_kNm=0.05")
+    q = np.array(swinging.q_cmd_rad)
+    q[:, 2] += 0.002 * q[:, 1] + 0.05 * DEG / 1000.0 * swinging.own_torque_Nm[:, 1]
+    np.testing.assert_allclose(signals.q_load_rad, q, atol=1e-15)
+    np.testing.assert_allclose(signals.q_true_rad, q, atol=1e-15)
+    np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
+    assert known["axis_coupling"].joints_at(None) == {"A3"}
+
+
+def test_a_belt_creeps_after_its_load(swinging, known):
+    """A steady torque that is gone at 6 s: what has crept goes back with the time constant."""
+    force = np.where(swinging.time_s[:, None] < 6.0, [0.0, 0.0, 0.0], [0.0, 0.0, 400.0])
+    still = np.tile(swinging.q_cmd_rad[:1], (len(swinging), 1))
+    position, rotation = robot.forward(still, swinging.cell)
+    inputs = replace(
+        swinging,
+        q_cmd_rad=still,
+        position_mm=position,
+        rotation=rotation,
+        force_base_N=force,
+        moment_base_Nmm=np.zeros_like(force),
+        kept={},
+    )
+    signals = run(inputs, known, "belt_wind_up:target=A5,deg_per_kNm=0.5,relax_s=3")
+    torque = inputs.own_torque_Nm[:, 4] / 1000.0
+    before, after = torque[0], torque[-1]
+    assert abs(after - before) > 0.02
+    crept = np.where(
+        inputs.time_s < 6.0, before, after - (after - before) * np.exp(-(inputs.time_s - 6.0) / 3.0)
+    )
+    rows = np.abs(inputs.time_s - 6.0) > 0.02  # the sample before a jump is half a slope already
+    found = (signals.q_load_rad - still)[rows, 4]
+    np.testing.assert_allclose(found, 0.5 * DEG * crept[rows], atol=0.5 * DEG * 4e-3 * abs(after - before))
+    np.testing.assert_array_equal(signals.q_true_rad, signals.q_load_rad)
+    with pytest.raises(NotUnderstoodError, match="allowed for belt_wind_up: A4, A5, A6"):
+        parse("belt_wind_up:target=A2,deg_per_kNm=1", known, inputs.cell)
+
+
+def test_a_joint_slips_each_time_its_torque_is_large(swinging, known):
+    torque = swinging.own_torque_Nm[:, 4]
+    assert torque.min() > 0.0
+    signals = run(swinging, known, "bolt_ratchet:target=A5,step_deg=0.01,threshold_Nm=300")
+    steps, is_high = [], torque[0] > 300.0
+    for value in torque:
+        rises = not is_high and value > 300.0
+        is_high = value > 300.0 or (is_high and value > 270.0)
+        steps.append(float(rises))
+    assert 2 <= sum(steps) <= 20
+    np.testing.assert_allclose(
+        (signals.q_load_rad - swinging.q_cmd_rad)[:, 4], 0.01 * DEG * np.cumsum(steps), atol=1e-12
+    )

@@ -45,14 +45,16 @@ def test_roles_of_the_library_are_stated_once():
             ("transmission", "phase"),
             ("encoder_interpolation", "phase"),
             ("joint_eccentricity", "phase"),
+            ("floor_vibration", "phase"),
+            ("bearing_wobble", "phase"),
         },
         Role.COUNT: {
             ("transmission", "harmonic"),
             ("encoder_interpolation", "periods"),
             ("pedestal_compliance", "own_weight"),
         },
-        Role.MOMENT: {("step", "at_s")},
-        Role.FREQUENCY: {("vibration", "hz")},
+        Role.MOMENT: {("step", "at_s"), ("collision", "at_s")},
+        Role.FREQUENCY: {("vibration", "hz"), ("floor_vibration", "hz")},
     }
     for effect in KNOWN.values():
         directions = [p.name for p in effect.parameters if p.role is Role.DIRECTION]
@@ -138,6 +140,9 @@ def test_usual_bounds_are_those_of_the_table():
     assert usual("transmission") == {"amplitude_deg": 1e-5 * DEG_PER_RAD}
     assert usual("clock", clocks=2) == {"offset_s": 6e-3, "skew": pytest.approx(3e-4)}
     assert usual("force_delay") == {"delay_s": 3e-3}
+    assert usual("tracker_filter", clocks=2) == {"tau_s": 6e-3}
+    assert usual("dead_time") == {"delay_s": 1e-3}
+    assert usual("servo_gain") == {"missing_share": pytest.approx(1e-3 * 30.0)}
     assert usual("velocity_rule") == {"k_s": m.k_s, "acc_cp_m_s2": m.acc_m_s2}
     for name in ("base_frame", "tool_frame"):
         assert usual(name)["x_mm"] == m.frame_mm
@@ -153,6 +158,9 @@ def test_usual_bounds_are_those_of_the_table():
         ("servo_lag", "A1", frozenset({"servo"}), {"servo", "gear"}),
         ("servo_lag", "A1", frozenset({"servo", "gear"}), {"servo", "gear", "mechanics", "part"}),
         ("backlash", "A2", frozenset({"servo"}), {"gear"}),
+        # six lags of their own stand for what they share
+        ("servo_lag", "all", EVERY, set()),
+        ("backlash", "all", EVERY, set()),
         ("backlash", "A2", frozenset({"gear"}), {"gear", "mechanics", "part"}),
         # a measured force does not replace the predicted one that bends the arm
         ("force_scale", "radial", frozenset(), {"force", "mechanics", "part"}),

@@ -216,3 +216,104 @@ def test_axes_are_where_the_kinematics_have_them(swinging):
         along = swinging.jacobian[:, 3:, joint]
         lever = swinging.position_mm - swinging.axes_mm[:, joint]
         np.testing.assert_allclose(np.cross(along, lever), way, atol=2e-2)
+
+
+def test_a_tracker_that_averages_is_late_and_cuts_corners(swinging, known):
+    """50 mm/s along x, then along y: behind by tau·v, and 0.51·tau·v inside the corner."""
+    t, v, tau = swinging.time_s, 50.0, 0.1
+    way = v * (t - 9.0)
+    tip = swinging.position_mm[0] + np.stack([np.minimum(way, 0.0), np.maximum(way, 0.0), 0.0 * t], axis=1)
+    free = np.zeros_like(tip)
+    inputs = replace(swinging, position_mm=tip, force_base_N=free, moment_base_Nmm=free, kept={})
+    signals = run(inputs, known, f"tracker_filter:tau_s={tau}")
+    seen = signals.tcp_base_mm
+    np.testing.assert_allclose((seen - tip)[600:740], [[-tau * v, 0.0, 0.0]] * 140, atol=1e-6)
+    nearest = np.linalg.norm(seen - swinging.position_mm[0], axis=1).min()
+    assert nearest == pytest.approx(0.509 * tau * v, rel=0.02)
+    np.testing.assert_array_equal(signals.q_true_rad, swinging.q_cmd_rad)
+    effect = known["tracker_filter"]
+    assert effect.visible_links(frozenset({"mechanics", "part"})) == {"mechanics"}
+    assert effect.learned(parse("tracker_filter:tau_s=0.1", known, swinging.cell), "mechanics") is None
+
+
+def test_a_floor_shakes_on_between_runs(swinging, known):
+    for hours in (0.0, 0.25):
+        moved = moved_by(
+            replace(swinging, hours=hours),
+            known,
+            "floor_vibration:target=y,hz=7.3,amplitude_mm=0.03,phase=0.4",
+        )
+        turn = 2.0 * np.pi * 7.3 * (hours * 3600.0 + swinging.time_s) + 0.4
+        np.testing.assert_allclose(moved[:, 1], 0.03 * np.sin(turn), atol=1e-9)
+        np.testing.assert_allclose(moved[:, [0, 2]], 0.0, atol=1e-9)
+
+
+def test_a_clamp_slips_each_time_the_cut_is_hard(swinging, known):
+    size = np.linalg.norm(swinging.force_base_N, axis=1)
+    high = size > 250.0
+    cuts = np.flatnonzero(high[1:] & ~high[:-1]) + 1  # bursts, with air between them
+    count = np.searchsorted(cuts, np.arange(len(size)), side="right")
+    assert count[-1] > 3
+    numbers = "step_mm=0.01,threshold_N=250,direction=0/3/4"
+    tip = run(swinging, known, f"bolt_ratchet:target=tip,{numbers}")
+    way = 0.01 * count[:, None] * [0.0, 0.6, 0.8]
+    np.testing.assert_allclose(tip.tcp_base_mm - simulate(swinging).tcp_base_mm, way, atol=1e-9)
+    part = run(swinging, known, f"bolt_ratchet:target=fixture,{numbers}")
+    np.testing.assert_array_equal(part.tcp_base_mm, simulate(swinging).tcp_base_mm)
+    np.testing.assert_allclose(part.part_shift_mm, way, atol=1e-12)
+    ratchet = known["bolt_ratchet"]
+    links = {target: ratchet.at(target).links_at(target) for target in ("tip", "fixture", "A3")}
+    assert links == {"tip": {"mechanics"}, "fixture": {"part"}, "A3": {"gear"}}
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_bearing_tilts_what_it_carries(swinging, known, joint):
+    """The tilt of every bearing is a turn of the tip by the stated angle, about a line across the axis."""
+    moved = moved_by(
+        swinging, known, f"bearing_wobble:target=A{joint + 1},amplitude_mrad=0.2,per_turn=7.5,phase=0.3"
+    )
+    axis = swinging.jacobian[:, 3:, joint]
+    lever = simulate(swinging).tcp_base_mm - swinging.axes_mm[:, joint]
+    along = np.sum(axis * lever, axis=1)
+    assert np.abs(moved).max() > 0.01
+    np.testing.assert_allclose(np.sum(moved * lever, axis=1), 0.0, atol=1e-6)
+    # a point on the axis goes round in a circle: across it, by angle times distance along it
+    across = moved - np.sum(moved * axis, axis=1, keepdims=True) * axis
+    np.testing.assert_allclose(np.linalg.norm(across, axis=1), 0.2e-3 * np.abs(along), atol=1e-6)
+
+
+def test_a_wobble_goes_round_so_often_a_turn_of_its_joint(swinging, known):
+    """Half a turn of the line, 180/7.5 degrees of A1, and the tip is tilted the other way."""
+    still = np.tile(swinging.q_cmd_rad[:1], (3, 1))
+    still[1, 0] += np.pi / 7.5
+    still[2, 0] += 2.0 * np.pi / 7.5
+    position, rotation = robot.forward(still, swinging.cell)
+    rows = {
+        name: getattr(swinging, name)[:3] for name in ("time_s", "move", "source_line", "path_mm", "tool")
+    }
+    inputs = replace(
+        swinging,
+        **rows,
+        q_cmd_rad=still,
+        position_mm=position,
+        rotation=rotation,
+        spindle_rad_s=np.zeros(3),
+        force_base_N=np.zeros((3, 3)),
+        moment_base_Nmm=np.zeros((3, 3)),
+        kept={},
+    )
+    moved = moved_by(inputs, known, "bearing_wobble:target=A1,amplitude_mrad=0.2,per_turn=7.5")
+    angles = np.arctan2(moved[:, 1], moved[:, 0])  # A1 is upright: what moves the tip sideways is the tilt
+    assert np.cos(angles[1] - angles[0]) == pytest.approx(-1.0, abs=1e-6)
+    assert np.cos(angles[2] - angles[0]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_slow_spindle_wobbles_and_a_fast_one_does_not(swinging, known):
+    text = "bearing_wobble:target=spindle,amplitude_mm=0.02,per_turn=0.43"
+    slow = moved_by(replace(swinging, spindle_rad_s=np.full(len(swinging), 6.0)), known, text)
+    x, y = swinging.tool_rotation[:, :, 0], swinging.tool_rotation[:, :, 1]
+    angle = np.unwrap(np.arctan2(np.sum(slow * y, axis=1), np.sum(slow * x, axis=1)))
+    np.testing.assert_allclose(np.diff(angle)[:-1], 0.43 * 6.0 * 0.012, rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(slow, axis=1), 0.02, rtol=1e-3)
+    fast = moved_by(replace(swinging, spindle_rad_s=np.full(len(swinging), 1361.0)), known, text)
+    assert np.linalg.norm(fast[:-1], axis=1).max() < 0.02 * 0.15

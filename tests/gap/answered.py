@@ -102,12 +102,12 @@ GAP = Gap(
         held_out=True,
     ),
     links=(
-        LinkResult(link="servo", rms_before=1e-3, rms_after=1e-3, noise=None, unit="deg", verdict="no_gap"),
+        LinkResult(link="servo", rms_before=1e-3, rms_after=1e-3, floor=None, unit="deg", verdict="no_gap"),
         LinkResult(
             link="mechanics",
             rms_before=0.4123,
             rms_after=0.0611,
-            noise=0.0304,
+            floor=0.0304,
             unit="mm",
             verdict="explained",
         ),

@@ -37,14 +37,14 @@ def test_a_logged_torque_comes_before_the_modelled_one():
     own = inputs_of(torque_Nm=logged, force_base_N=np.tile(PUSH_N, (COUNT, 1)))
     np.testing.assert_allclose(own.torque_Nm, logged)
     assert own.load_torque_Nm.any()
-    assert own.torque_with_memory(2).shape == (COUNT, 2)
+    assert own.torque_with_memory(2).shape == (COUNT, 6)
 
 
 def test_memory_of_a_torque_lags_at_each_turn_and_not_between():
     rising = np.column_stack([np.linspace(0.0, 1.0, COUNT)] * 6)
     memory = inputs_of(torque_Nm=rising).torque_with_memory(0)
     # a play follows a rising torque half its width behind, once it has been taken up
-    assert memory[-1] == pytest.approx([0.05, 0.2])
+    assert memory[-1] == pytest.approx([0.0125, 0.025, 0.05, 0.1, 0.2, 0.4])
 
 
 def test_directions_are_those_of_each_joint():

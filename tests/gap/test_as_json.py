@@ -11,6 +11,7 @@ from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.tell.as_json import SCHEMA, gap_object, plain
 from gcode2krl.gap.tell.result import (
     CauseResult,
+    DependsOnResult,
     EffectAt,
     Gap,
     GapSize,
@@ -18,6 +19,7 @@ from gcode2krl.gap.tell.result import (
     NotExamined,
     RivalResult,
     Unexplained,
+    UnknownAt,
     Where,
 )
 
@@ -37,7 +39,7 @@ def _cause(**more):
 
 def _link(**more):
     return LinkResult(
-        link="gear", rms_before=1.0, rms_after=0.5, noise=0.4, unit="deg", verdict="explained", **more
+        link="gear", rms_before=1.0, rms_after=0.5, floor=0.4, unit="deg", verdict="explained", **more
     )
 
 
@@ -63,6 +65,7 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
         "at_part",
         "links",
         "where",
+        "events",
         "causes",
         "unexplained",
         "not_examined",
@@ -83,6 +86,7 @@ def test_the_keys_are_those_of_the_contract_in_their_order():
         "max_after",
         "shrink",
         "held_out",
+        "per_run",
     ]
     assert list(found["where"]) == [
         "signals",
@@ -107,6 +111,18 @@ def test_keys_of_some_causes_and_links_are_left_out_and_others_are_null():
     assert (compared["rivals"], compared["shrink"]) == ([], None)
     assert "offset_deg" not in plain(_link())
     assert plain(_link(offset_deg={"A1": 0.5}))["offset_deg"] == {"A1": 0.5}
+
+
+def test_a_moment_has_two_names_and_an_unknown_may_be_in_a_declared_set():
+    at = DependsOnResult(
+        link="gear", at="A2", on="time in the run", form="step", probability=0.9, share=0.5, at_time_s=3.5
+    )
+    rest = Unexplained(rms=0.1, significant=True, structure="structured", depends_on=(at,))
+    (found,) = gap_object(_gap(unexplained=rest))["unexplained"]["depends_on"]
+    assert (found["t_s"], found["at_time_s"]) == (3.5, 3.5)
+    assert {"run", "line", "frequency_hz", "direction", "course"} <= set(found)
+    compared = plain(_cause(indistinguishable_from=(UnknownAt("A2", "reversals"),)))
+    assert compared["indistinguishable_from"] == [{"kind": "unknown", "at": "A2", "on": "reversals"}]
 
 
 def test_numbers_are_plain_and_what_is_not_finite_is_null():

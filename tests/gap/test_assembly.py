@@ -14,6 +14,7 @@ from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PATH, SERVO
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.judged import Cause, Judgement
+from gcode2krl.gap.fit.noise import white
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell import assembly
 from gcode2krl.gap.tell.evidence import Depends
@@ -43,6 +44,10 @@ def _trace(link, factor=10.0, components=JOINTS, zero=0.0, left_out=()):
     return SimpleNamespace(
         run="run-1",
         left_out=left_out,
+        events=(),
+        still=False,
+        declared_sigma=None,
+        shape=(4, len(components)),
         link=link,
         signal=link.signal,
         unit=link.unit,
@@ -63,7 +68,7 @@ def _judgement(link, verdict="no_gap", size=None, usual=(), **trace):
         held_out=True,
         factor=traces[0].factor,
         traces=traces,
-        examination=SimpleNamespace(),
+        examination=SimpleNamespace(noise=[white(1e-4)] * traces[0].shape[1]),
         usual=tuple(usual),
     )
 
@@ -102,7 +107,7 @@ def test_the_largest_gap_is_that_over_its_noise_and_links_with_one_come_first():
 
 
 def test_sizes_are_in_the_unit_of_the_report():
-    size = assembly._size(_judgement(GEAR, "unexplained"), [])
+    size = assembly._size(_judgement(GEAR, "unexplained"), [], {})
     assert (size.signal, size.unit) == (GEAR.signal, "deg")
     assert (size.rms_before, size.rms_after, size.noise_floor) == (20.0, 10.0, 5.0)
     assert (size.max_before, size.max_after, size.held_out) == (50.0, 20.0, True)
@@ -110,9 +115,9 @@ def test_sizes_are_in_the_unit_of_the_report():
 
 
 def test_a_slip_states_the_size_where_links_have_no_gap():
-    size = assembly._size(_judgement(GEAR), [_slip()])
+    size = assembly._size(_judgement(GEAR), [_slip()], {})
     assert (size.signal, size.rms_before, size.rms_after) == (PATH.signal, 2.0, 0.1)
-    nothing = assembly._size(None, [])
+    nothing = assembly._size(None, [], {})
     assert (nothing.signal, nothing.unit, nothing.rms_before) == ("tcp", "mm", None)
 
 
@@ -146,7 +151,7 @@ def test_what_is_left_is_structured_where_it_is_significant():
 def test_notes_name_joints_left_out_and_effects_within_mismatch():
     (usual,) = applied("backlash:target=A2,gap_deg=0.0001")
     judgements = [_judgement(SERVO, components=JOINTS[:4]), _judgement(MECHANICS, usual=[usual])]
-    assert list(assembly._notes([], judgements)) == [
+    assert [note for note in assembly._notes([], judgements) if "noise" not in note] == [
         "servo: A5, A6 left out: not recorded, or never moving",
         "mechanics: backlash A2 within normal mismatch",
     ]
@@ -154,7 +159,10 @@ def test_notes_name_joints_left_out_and_effects_within_mismatch():
 
 def test_notes_name_what_was_taken_out_of_the_measured_values():
     judgement = _judgement(FORCE, left_out=("hum of the mains at 50 Hz",))
-    assert list(assembly._notes([], [judgement])) == ["force, run-1: hum of the mains at 50 Hz left out"]
+    assert list(assembly._notes([], [judgement])) == [
+        "force, run-1: hum of the mains at 50 Hz left out",
+        "force: the noise is neither stated nor repeated; taken as 0.001 N",
+    ]
 
 
 def test_a_run_that_is_of_another_program_gets_an_answer_without_links(tmp_path):

@@ -1,16 +1,18 @@
 """Causes as the answer states them: units, rivals, the intervals of slips."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.links import GEAR, PATH
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.judged import Cause
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
-from gcode2krl.gap.tell.result import EffectAt, RivalResult
+from gcode2krl.gap.tell.result import EffectAt, RivalResult, UnknownAt
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import applied
 
@@ -42,6 +44,17 @@ def test_rivals_are_alike_or_have_a_probability():
     assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}", 1.0) for n in range(1, 6))
     assert len(found.indistinguishable_from) == THRESHOLDS.tell.most_alike
     assert found.rivals == (RivalResult("base_frame", None, 0.2, 20.0),)
+
+
+@pytest.mark.parametrize(("behind", "is_open"), [(None, False), (-3.0, True), (1.0, True), (20.0, False)])
+def test_an_unknown_of_the_same_kind_is_in_the_set_where_no_form_is_told_from_it(behind, is_open):
+    family = SimpleNamespace(place=SimpleNamespace(name="A2"), on=Dependence.REVERSALS)
+    tests = SimpleNamespace(family=family, family_behind=behind, form_ratio=1.0)
+    told = cause_of(
+        replace(_cause([(_rival("base_frame:x_mm=1", True), 0.1)]), tests=tests), JUDGEMENT, "gear"
+    )
+    unknown = [UnknownAt("A2", "reversals")] if is_open else []
+    assert list(told.indistinguishable_from) == [EffectAt("base_frame", None, 1.0), *unknown]
 
 
 def _slip(text, before=1.0, after=0.1, **more):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.decimals import resolution, step_of
 
 
 @pytest.mark.parametrize("step", [0.5, 0.01, 1e-5])
@@ -16,3 +16,11 @@ def test_rounding_has_the_rms_of_a_uniform_draw(step):
 
 def test_a_constant_has_no_last_decimal():
     assert resolution(np.full(50, 3.0)) == 0.0
+
+
+def test_few_values_are_on_a_ladder_or_on_none():
+    values = np.random.default_rng(0).uniform(-500.0, 500.0, 12)
+    assert step_of(20.0 * np.round(values / 20.0)) == pytest.approx(20.0)
+    assert step_of(np.array([0.37, 20.37, 0.37])) == pytest.approx(20.0)
+    assert step_of(np.round(values, 2)) == pytest.approx(0.01)
+    assert step_of(values) < 1e-6

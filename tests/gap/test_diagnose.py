@@ -8,6 +8,7 @@ import pytest
 
 from gcode2krl.gap import Gap, diagnose, text_report
 from gcode2krl.gap.tell.as_json import SCHEMA
+from gcode2krl.gap.tell.result import EffectAt
 from gcode2krl.runs import RunHead
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
@@ -17,6 +18,11 @@ SERVO = {"tracker": False, "force": False}
 GEAR = {**SERVO, "load_encoders": True}
 FORCE = {"tracker": False, "controller": False}
 TIP = {"force": False}
+
+
+def _alike(cause):
+    """Return the effects of the library in the declared set of a cause."""
+    return [each for each in cause.indistinguishable_from if isinstance(each, EffectAt)]
 
 
 def _gap(*texts: str, seed: int = 5, count: int = 2, **signals: bool) -> Gap:
@@ -45,7 +51,7 @@ def test_an_effect_is_named_with_its_target_and_size(text, signals, parameter, t
     truth = applied(text)[0]
     gap = _gap(text, **signals)
     first = gap.causes[0]
-    alike = [(each.effect, each.target) for each in first.indistinguishable_from]
+    alike = [(each.effect, each.target) for each in _alike(first)]
     assert (truth.effect.name, truth.target) in [(first.effect, first.target), *alike]
     assert len(gap.named_causes) == 1
     assert first.probability > 0.5
@@ -106,7 +112,7 @@ def test_commands_with_a_clock_of_their_own_are_named_once():
 
 def test_what_the_data_do_not_see_is_not_said_to_be_known():
     gap = _gap("tool_frame:x_mm=0.3,y_mm=-0.2,c_deg=0.02", **TIP)
-    alike = {each.effect for cause in gap.causes for each in cause.indistinguishable_from}
+    alike = {each.effect for cause in gap.causes for each in _alike(cause)}
     assert {"tool_frame", "base_frame"} & ({gap.causes[0].effect} | alike)
     angle = gap.causes[0].parameters.get("c_deg")
     if gap.causes[0].effect == "tool_frame":  # the tracker sees the tip, which a turn about it leaves
@@ -176,6 +182,7 @@ def test_the_json_has_every_key_and_plain_values():
         "max_after",
         "shrink",
         "held_out",
+        "per_run",
     }
     assert set(found["where"]) == {
         "signals",
@@ -197,3 +204,26 @@ def test_the_report_begins_with_a_sentence():
 
 def test_every_cause_of_the_library_has_a_link():
     assert all(effect.links for effect in LIBRARY.values() if effect.kind == "cause")
+
+
+def test_a_collision_is_told_with_moment_line_and_force_and_what_it_left_behind():
+    """A blow of 1.1 kN in the second run, by which A2 slips by 0.0225 deg."""
+
+    def struck(name, values, stamps, signals, number):
+        since = (stamps - 8.0) / 0.05
+        pulse = np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
+        blow_N = 1100.0 * pulse[:, None] * np.array([0.6, 0.0, 0.8])
+        return values + blow_N if name == "force_N" and number == 1 else values
+
+    slipped = applied("step:target=A2,at_s=1808.025,size_deg=0.0225")
+    gap = diagnose(prediction(), runs(slipped, extra=struck, load_encoders=True))
+    (event,) = [each for each in gap.events if each.link == "force"]
+    assert (event.what, event.run) == ("impulse", "run-2")
+    assert event.t_s == pytest.approx(8.025, abs=0.02)
+    assert event.size == pytest.approx(1100.0, rel=0.05)
+    hit = f"The tool hit something at {event.t_s:.2f} s of run-2, line {event.line}: 1.1 kN"
+    assert text_report(gap).startswith(hit)
+    # the runs do not say when they began, so that the step of run-2 is nobody's in particular
+    step = gap.unexplained.depends_on[0]
+    assert (step.form, step.at, step.run, step.line) == ("step", "A2", "run-2", event.line)
+    assert step.size == pytest.approx(0.0225, rel=0.05)

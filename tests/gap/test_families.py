@@ -1,5 +1,7 @@
 """Families against dense matrices, and on signals whose dependence is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -162,6 +164,63 @@ def test_a_shift_of_the_tip_has_its_direction():
     assert tip.nats > study.evidences[0].nats - 10.0
 
 
+# What a force and a torque remember
+
+
+def force_inputs():
+    """Return the motion with a force that comes and goes, no two times alike."""
+    time_s = c.motion().time_s
+    waves = [np.sin(2.0 * np.pi * hz * time_s + hz) for hz in (0.9, 1.7, 0.53)]
+    return replace(c.motion(), force_base_N=80.0 * np.tanh(3.0 * np.stack(waves, axis=1)))
+
+
+def force_study(form, sigma_N=2.0):
+    made = []
+    for number in range(2):
+        blank = c.trace(np.zeros((COUNT, 3)), "force", number, force_inputs())
+        added = form(blank) + c.noise(COUNT, number, sigma_N, 3)
+        made.append(c.trace(added, "force", number, force_inputs()))
+    return best_of(made, sigma=sigma_N)
+
+
+@pytest.mark.parametrize("delay_s", [0.01, 0.045, 0.12])
+def test_a_late_force_depends_on_its_own_rate(delay_s):
+    best = force_study(lambda blank: blank.late(delay_s) - blank.nominal).evidences[0]
+    assert (best.place.name, best.on) == ("force", Dependence.VELOCITY)
+
+
+def dahl(x, width):
+    """Return the smooth loop (n,) of Dahl (1968) along x, of unit height."""
+    z = np.zeros(len(x))
+    for i, step in enumerate(np.diff(x)):
+        z[i + 1] = np.sign(step) + (z[i] - np.sign(step)) * np.exp(-abs(step) / width)
+    return z
+
+
+def test_a_force_sensor_with_a_loop_depends_on_the_force():
+    best = force_study(lambda blank: 4.0 * np.stack([dahl(f, 20.0) for f in blank.nominal.T], axis=1))
+    assert best.evidences[0].on is Dependence.FORCE
+    (other, *_) = [each for each in best.evidences if each.on is not Dependence.FORCE]
+    assert best.evidences[0].nats > 1.2 * other.nats
+
+
+@pytest.mark.parametrize("share", [0.03, 0.3])
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_smooth_loop_of_a_torque_is_no_time_in_the_run(share, joint):
+    """Of narrow and of wide loops the family takes all but a hundredth."""
+    traces, loops = [], []
+    for number in range(3):
+        values = c.noise(COUNT, number, 1.0, 6)
+        torque = Admissible(c.trace(values, "gear", number)).torque_Nm[:, joint]
+        loops.append(3.0 * dahl(torque, share * np.ptp(torque)))
+        values[:, joint] += loops[-1]
+        traces.append(c.trace(values, "gear", number))
+    best = best_of(traces).evidences[0]
+    assert (best.place.name, best.on) == (f"A{joint + 1}", Dependence.OWN_TORQUE)
+    loop = np.concatenate(loops)
+    assert np.mean((np.concatenate(best.signal)[:, 0] - loop) ** 2) < 0.01 * np.mean(loop**2)
+
+
 # Functions
 
 
@@ -220,4 +279,12 @@ def test_amplitudes_reach_from_a_tenth_of_the_noise_to_a_hundred_times_it():
     assert AMPLITUDES.tolist() == list(limits.amplitudes) == sorted(limits.amplitudes)
     assert AMPLITUDES[0] <= 0.1
     assert AMPLITUDES[-1] >= 100.0
-    assert limits.gap_p >= 1.0 / (1.0 + limits.flips)
+    assert limits.significant_p >= 1.0 / (1.0 + limits.flips)
+
+
+def test_the_tail_goes_on_where_the_flips_end():
+    sound = [best_of(joint_traces(lambda own, run: 0.0 * own.hours, seed=10 * i)).tail_p for i in range(6)]
+    assert min(sound) > 1e-3
+    strong = best_of(joint_traces(lambda own, run: 8.0 * own.rate_rad_s[:, 0]))
+    assert strong.p == pytest.approx(1.0 / 201.0)
+    assert strong.tail_p < 0.1 * strong.p

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.choose.family_tests import FamilyTests, LinkFamilies, net_gain
+from gcode2krl.gap.choose.family_tests import FamilyTests, LinkFamilies, Rest, net_gain
 from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.families.study import Study
 from tests.gap import constructed as c
 
 SIGMA = 1e-4
@@ -158,3 +159,23 @@ def test_evidence_within_its_inflation_counts_for_nothing():
     strong, weak = c.stub(nats=30.0, inflation=2.0), c.stub(nats=30.0, inflation=20.0)
     assert net_gain(strong) == 60.0
     assert net_gain(weak) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("nats", "inflation", "tail_p", "known", "wanted"),
+    [
+        (30.0, 1.0, 1e-6, 1e5, True),
+        (30.0, 2.0, 1e-6, 1e5, False),  # over its inflation it is not certain
+        (150.0, 1.0, 0.01, 1e5, False),  # few strong stretches of a sound link
+        (5000.0, 10.0, 0.01, 1e5, True),  # beyond all that models are off by
+        (30.0, 1.0, 1e-6, 1e6, False),  # less than a hundredth of what is known, in amplitude
+        (5000.0, 1.0, 1e-6, 2e8, False),
+    ],
+)
+def test_a_gap_is_rare_or_beyond_what_models_are_off_by_however_small_beside_the_noise(
+    nats, inflation, tail_p, known, wanted
+):
+    evidence = c.stub(nats=nats, inflation=inflation)
+    for gap_gain, upstream_gain in ((known, 0.0), (0.0, known)):
+        rest = Rest(Study(1e9, (evidence,), 0.005, tail_p), gap_gain, upstream_gain=upstream_gain)
+        assert rest.is_gap is wanted

@@ -4,8 +4,17 @@ from dataclasses import replace
 
 import pytest
 
+from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.tell.first_sentence import amount, headline, stretch
-from gcode2krl.gap.tell.result import AtPart, JointResult, PhaseResult, Where
+from gcode2krl.gap.tell.result import (
+    AtPart,
+    EventResult,
+    JointResult,
+    MomentResult,
+    PhaseResult,
+    RunSize,
+    Where,
+)
 from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, TIP, UNEXPLAINED, UNSURE
 
 
@@ -116,3 +125,79 @@ def test_amounts_and_stretches():
     assert amount(0.0031, "mm") == "0.0031 mm"
     assert stretch(STRETCH) == "run-1: 2.00-4.00 s, lines 120-131"
     assert stretch(replace(STRETCH, lines=(), t_start_s=-0.001)) == "run-1: 0.00-4.00 s"
+
+
+def runs(*sizes):
+    return tuple(
+        RunSize(run=f"run-{number}", rms_before=size, rms_after=None, held_out=False)
+        for number, size in enumerate(sizes, 1)
+    )
+
+
+@pytest.mark.parametrize(
+    ("what", "sizes", "words"),
+    [
+        ("tip", (0.029, 0.159), "The tip is off by 0.11 mm RMS, 0.16 mm in run-2: backlash"),
+        ("tip", (0.1, 0.12), "The tip is off by 0.11 mm RMS: backlash"),
+        ("tip", (0.11,), "The tip is off by 0.11 mm RMS: backlash"),
+    ],
+)
+def test_the_run_that_is_off_most_is_named_where_it_stands_out(what, sizes, words):
+    at = replace(TIP, rms_before=0.114, per_run=runs(*sizes))
+    assert headline(replace(GAP, at_part=at)).startswith(words)
+
+
+def test_the_worst_run_and_the_phase_are_told_apart():
+    at = replace(TIP, rms_before=0.114, per_run=runs(0.029, 0.159))
+    assert headline(replace(GAP, at_part=at, where=where(0.8))).startswith(
+        "The tip is off by 0.11 mm RMS, 0.16 mm in run-2, four fifths of the gap after reversals of axis 2:"
+    )
+
+
+def test_what_is_left_is_told_beside_what_there_was_on_the_same_data_where_that_is_another_size():
+    at = replace(TIP, rms_before=0.114, rms_after=0.0201, held_out_before=0.029)
+    said = headline(replace(GAP, at_part=at))
+    assert said.startswith("The tip is off by 0.11 mm RMS: ")
+    assert "With it in the model 0.020 mm of 0.029 mm are left on data not used" in said
+    same = replace(at, held_out_before=0.11)
+    assert "0.020 mm are left on data not used" in headline(replace(GAP, at_part=same))
+
+
+BLOW = EventResult(
+    link="force", run="run-2", t_s=11.8, line=42, what="impulse", size=1154.0, unit="N", lasts_s=0.04
+)
+SLIPPED = replace(
+    LAG,
+    effect="step",
+    target="A2",
+    probability=0.9,
+    parameters={"at_s": Interval(6384.0, 6383.9, 6384.1), "size_deg": Interval(-0.0225, -0.023, -0.022)},
+    moment=MomentResult(run="run-2", t_s=11.82, line=42),
+)
+
+
+def test_what_happened_is_told_before_the_step_that_it_left_behind():
+    hit = replace(GAP, causes=(SLIPPED,), events=(BLOW,))
+    assert headline(hit).startswith(
+        "The tool hit something at 11.80 s of run-2, line 42: 1.2 kN; since then A2 is off by 0.0225 deg. "
+        "The tip is off by 0.41 mm RMS: step of A2, at 11.82 s of run-2, line 42, -0.0225 deg"
+    )
+    later = replace(SLIPPED, moment=MomentResult(run="run-2", t_s=14.0, line=50))
+    assert "since then" not in headline(replace(GAP, causes=(later,), events=(BLOW,)))
+
+
+def test_one_reading_alone_is_no_blow_and_a_burst_is_not_in_the_first_sentence():
+    alone = replace(
+        GAP,
+        verdict="unexplained",
+        causes=(),
+        events=(BLOW,),
+        unexplained=replace(UNEXPLAINED.unexplained, depends_on=()),
+    )
+    assert headline(alone) == (
+        "The force jumps at 11.80 s of run-2, line 42, for 40 ms: 1.2 kN. "
+        "What else the runs differ by, noise and normal mismatch explain."
+    )
+    tip = replace(BLOW, link="mechanics", size=0.6, unit="mm")
+    assert headline(replace(alone, events=(BLOW, tip))).startswith("The tool hit something")
+    assert headline(replace(GAP, events=(replace(BLOW, what="burst"),))) == headline(GAP)

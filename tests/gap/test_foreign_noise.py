@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.bursts import without_bursts
+from gcode2krl.gap.beside.events import sorted_out
 from gcode2krl.gap.choose.judgement import judge
 from tests.gap.constructed import LINK, Added, motion, question, trace, wave
 
@@ -78,7 +78,7 @@ def judged(kind, gap, seed, quantum=0.0, **more):
         inputs = motion(15.0)
         inputs = replace(inputs, position_mm=inputs.position_mm + 5.0 * i)
         traces.append(trace(SIGMA * y[:, None], number=i, inputs=inputs, **more))
-    return judge(LINK["servo"], without_bursts(traces), [], question(EFFECTS))
+    return judge(LINK["servo"], sorted_out(traces, {}), [], question(EFFECTS))
 
 
 def nothing(run):

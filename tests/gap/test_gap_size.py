@@ -14,7 +14,7 @@ from tests.gap.constructed import applied, columns_nuisance, motion, noise, trac
 pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
 
 COUNT, SIGMA = 500, 0.5
-SIGNIFICANT_SIGMA, LEAST_SHARE = 4.0, 0.1
+SIGNIFICANT_SIGMA = 4.0
 """Of an excess that counts (docs/thresholds.md)."""
 TIME_S = motion().time_s
 EFFECT = wave(2.0)
@@ -46,6 +46,14 @@ def test_components_add_up():
     assert found.before == pytest.approx(np.mean(np.sum(y**2, axis=1)))
     assert found.noise == pytest.approx(5.0 * SIGMA**2)
     assert found.largest_before == pytest.approx(np.hypot(*y.T).max())
+
+
+def test_an_instrument_noisier_than_stated_is_no_gap_by_its_size():
+    y = noise(COUNT, 5, 2.0 * SIGMA)
+    stated = replace(white(1.4 * SIGMA), beyond=SIGMA * float(np.sqrt(4.0 - 1.4**2)))
+    assert size_of_gap([trace(y)], [[]], [replace(stated, beyond=0.0)], []).significant
+    assert not size_of_gap([trace(y)], [[]], [stated], []).significant
+    assert size_of_gap([trace(y + 3.0 * SINE[:, None])], [[]], [stated], []).significant
 
 
 @pytest.mark.parametrize("height", [0.4, 4.0])
@@ -152,15 +160,25 @@ def test_few_stretches_need_more_deviations():
     """A t distribution of 11.5 degrees of freedom beyond about six is as rare as a normal one beyond four."""
     certain = replace(PLAIN, deviation=1.0, noise=1.0, freedom=11.5)
     rare = norm.sf(SIGNIFICANT_SIGMA)
-    assert not replace(certain, excess=0.99 * t.isf(rare, 11.5)).significant
-    assert replace(certain, excess=1.01 * t.isf(rare, 11.5)).significant
+    assert not replace(certain, calm_excess=0.99 * t.isf(rare, 11.5)).significant
+    assert replace(certain, calm_excess=1.01 * t.isf(rare, 11.5)).significant
     assert 5.5 < t.isf(rare, 11.5) < 6.5
 
 
-def test_significance_needs_both_a_certain_excess_and_one_that_counts():
-    by_deviation = replace(PLAIN, deviation=1.0, noise=1.0)
-    assert not replace(by_deviation, excess=0.99 * SIGNIFICANT_SIGMA).significant
-    assert replace(by_deviation, excess=1.01 * SIGNIFICANT_SIGMA).significant
-    by_share = replace(PLAIN, deviation=1e-9, noise=2.0)
-    assert not replace(by_share, excess=0.99 * LEAST_SHARE * 2.0).significant
-    assert replace(by_share, excess=1.01 * LEAST_SHARE * 2.0).significant
+def test_an_excess_is_significant_by_its_deviation_whatever_the_noise():
+    certain = replace(PLAIN, deviation=1.0)
+    for noise_power in (1.0, 1e6):
+        beside = replace(certain, noise=noise_power)
+        assert not replace(beside, calm_excess=0.99 * SIGNIFICANT_SIGMA).significant
+        assert replace(beside, calm_excess=1.01 * SIGNIFICANT_SIGMA).significant
+
+
+def test_an_event_in_a_few_rows_is_no_excess_and_a_wander_below_a_tenth_of_the_noise_is():
+    spike = noise(5000, 8, SIGMA)[:, 0]
+    spike[2000:2012] += 100.0 * SIGMA
+    found = size(spike)
+    assert found.excess > 10.0 * SIGMA**2
+    assert not found.significant
+    assert abs(found.calm_excess) < 0.1 * SIGMA**2
+    wander = noise(60_000, 9, SIGMA)[:, 0] + 0.35 * SIGMA * np.sign(np.sin(np.arange(60_000) / 700.0))
+    assert size(wander).significant

@@ -71,7 +71,7 @@ def test_a_fixture_that_slips_is_no_warming_up():
 
 def test_the_slip_is_told_with_its_moment_size_and_direction():
     found, way = slip()
-    best = next(iter(depends_on(found)))
+    best, _ = next(iter(depends_on(found)))
     assert (best.at, best.form, best.run) == ("tip", "step", "run-1")
     assert best.at_time_s == pytest.approx(8.0, abs=0.1)
     assert best.size == pytest.approx(np.linalg.norm(way), rel=0.1)
@@ -86,7 +86,7 @@ def test_a_tool_that_grows_in_each_run_is_no_frame():
 
     found = judged(MECHANICS, extra=moved(form))
     assert names(found) == []
-    best = next(iter(depends_on(found)))
+    best, _ = next(iter(depends_on(found)))
     assert best.on in ("time since the run's start", "spindle speed", "metres cut")
     assert abs(best.direction[2]) > 0.9
 
@@ -114,7 +114,7 @@ def test_a_tool_that_is_pulled_out_is_no_frame():
 
     found = judged(MECHANICS, extra=moved(form))
     assert names(found) == []
-    best = next(iter(depends_on(found)))
+    best, _ = next(iter(depends_on(found)))
     assert best.at in ("tip", "A2")  # A2 moves it up and down too, with one number instead of three
     assert best.on not in ("place", "constant")
     assert abs(best.direction[2]) > 0.9

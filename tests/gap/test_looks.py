@@ -44,7 +44,7 @@ def gap():
         gap=GapSize(signal="tcp", unit="mm", rms_before=0.7, rms_after=0.07),
         links=(
             LinkResult(
-                link="mechanics", rms_before=0.7, rms_after=0.07, noise=0.02, unit="mm", verdict="unexplained"
+                link="mechanics", rms_before=0.7, rms_after=0.07, floor=0.02, unit="mm", verdict="unexplained"
             ),
         ),
         where=Where(),

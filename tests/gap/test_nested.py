@@ -30,7 +30,15 @@ def order(*evidences):
 def test_the_smaller_one_is_told_where_the_larger_takes_hardly_more(larger):
     smaller = min(CONTAINS[larger], key=lambda each: each.value)
     assert order(evidence(larger, 1000.0), evidence(smaller, 985.0)) == [(smaller, 1000.0), (larger, 985.0)]
-    assert order(evidence(larger, 1000.0), evidence(smaller, 900.0)) == [(larger, 1000.0), (smaller, 900.0)]
+    assert order(evidence(larger, 1000.0), evidence(smaller, 890.0)) == [(larger, 1000.0), (smaller, 890.0)]
+
+
+def test_what_each_run_does_over_time_is_the_last_resort():
+    """A physical input that does nearly as well comes first; of two of these the better one."""
+    near = [evidence(Dependence.RUN_TIME, 1000.0), evidence(Dependence.OWN_TORQUE, 930.0)]
+    assert order(*near)[0] == (Dependence.OWN_TORQUE, 1000.0)
+    physical = [evidence(Dependence.PLACE, 1000.0), evidence(Dependence.CONSTANT, 930.0)]
+    assert order(*physical)[0] == (Dependence.PLACE, 1000.0)
 
 
 def test_a_chain_ends_at_the_smallest():

@@ -2,20 +2,22 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from gcode2krl.canned.trial import trials_of
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.choose.judged import Cause
+from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.next_run import (
     Answer,
     Choice,
     Family,
     OpenPair,
     Parting,
-    answer_of,
     best,
     choose_next_run,
     open_pairs,
@@ -23,9 +25,9 @@ from gcode2krl.gap.choose.next_run import (
 from gcode2krl.gap.choose.rivals import Rival
 from gcode2krl.gap.choose.separation import Apart
 from gcode2krl.gap.tell.next_run import next_run_of, shown, told
-from gcode2krl.gap.tell.result import DependsOnResult, NextRun
+from gcode2krl.gap.tell.result import DependsOnResult
 from gcode2krl.gap.thresholds import THRESHOLDS
-from tests.gap.constructed import LINK, cell, stub
+from tests.gap.constructed import LINK, cell, noise, question, stub, trace
 from tests.gap.test_separation import ALONG_X, SIGMA_MM, TRIALS, at, measured
 
 KNOWN = library()
@@ -44,11 +46,22 @@ def cause(found, probability, *rivals, **intervals):
     )
 
 
-def judgement(found, *causes, verdict="explained", after=SIGMA_MM, before=0.3):
-    size = stub(before=before**2, after=after**2, floor=SIGMA_MM**2, power=1.0, significant=True)
-    link = LINK["mechanics"]
+def judgement(
+    found, *causes, verdict="explained", after=SIGMA_MM, before=0.3, runs=(), impulses=(), significant=True
+):
+    size = stub(before=before**2, after=after**2, floor=SIGMA_MM**2, power=1.0, significant=significant)
     return stub(
-        link=link, verdict=verdict, causes=causes, examination=found, size=size, factor=1.0, applied=()
+        link=LINK["mechanics"],
+        verdict=verdict,
+        causes=causes,
+        examination=found,
+        size=size,
+        told=size,
+        factor=1.0,
+        applied=tuple(each.applied for each in causes if each.probability >= LIMITS.named),
+        every=tuple(runs or found.traces),
+        impulses=impulses,
+        rest=None,
     )
 
 
@@ -81,21 +94,21 @@ def labels(pairs):
 
 
 def test_what_is_settled_or_no_gap_leaves_nothing_open(offset):
-    assert labels(open_pairs(KNOWN, [judgement(offset, cause(offset, 0.98))])) == []
+    assert labels(open_pairs([judgement(offset, cause(offset, 0.98))])) == []
     nothing = judgement(offset, cause(offset, 0.6, alike(FRAME, 0.6)), verdict="no_gap")
-    assert labels(open_pairs(KNOWN, [nothing])) == []
+    assert labels(open_pairs([nothing])) == []
     settled = judgement(offset, cause(offset, 0.97, worse(FRAME, 0.02)))
-    assert labels(open_pairs(KNOWN, [settled])) == []
+    assert labels(open_pairs([settled])) == []
 
 
 def test_rivals_alike_are_open_however_sure_the_two_are_together(offset):
-    pairs = open_pairs(KNOWN, [judgement(offset, cause(offset, 0.98, alike(FRAME, 0.98)))])
+    pairs = open_pairs([judgement(offset, cause(offset, 0.98, alike(FRAME, 0.98)))])
     assert labels(pairs) == [("tool_frame", "base_frame", 0.98)]
 
 
 def test_an_unsure_cause_is_open_against_its_rivals_and_the_unknown(offset):
     unsure = cause(offset, 0.6, worse(FRAME, 0.2), worse(at("mastering", "A1", offset_deg=0.1), 0.01))
-    assert labels(open_pairs(KNOWN, [judgement(offset, unsure)])) == [
+    assert labels(open_pairs([judgement(offset, unsure)])) == [
         ("tool_frame", "base_frame", 0.12),
         ("tool_frame", "something else", 0.114),
     ]
@@ -107,24 +120,32 @@ def test_families_of_the_link_are_open_beside_a_cause_and_among_each_other(offse
     elsewhere = Family("gear", "A2", "reversals", "loop", 0.9)
     families = [drift, place, elsewhere]
     alone = judgement(offset, verdict="unexplained")
-    assert labels(open_pairs(KNOWN, [alone], families)) == [("tip, wall clock", "tip, constant", 0.15)]
+    assert labels(open_pairs([alone], families)) == [("tip, wall clock", "tip, constant", 0.15)]
     named = judgement(offset, cause(offset, 0.98), verdict="partly_explained")
-    assert labels(open_pairs(KNOWN, [named], families)) == [
+    assert labels(open_pairs([named], families)) == [
         ("tool_frame", "tip, wall clock", 0.5),
         ("tool_frame", "tip, constant", 0.3),
     ]
     doubted = judgement(offset, cause(offset, 0.02, alike(FRAME, 0.02)), verdict="unexplained")
-    assert labels(open_pairs(KNOWN, [doubted], [drift])) == [("tip, wall clock", "something else", 0.5)]
+    assert labels(open_pairs([doubted], [drift])) == [("tip, wall clock", "something else", 0.25)]
 
 
-def test_a_family_is_simulated_by_an_effect_that_depends_on_it(offset):
-    found = answer_of(Family("mechanics", "A2", "reversals", "loop", 0.5), KNOWN, judgement(offset))
-    assert found.applied is not None
-    assert found.applied.target == "A2"
-    assert "reversals" in {each.value for each in found.applied.effect.depends_on}
-    unknown = answer_of(Family("mechanics", "tip", "no such input", "smooth", 0.5), KNOWN, judgement(offset))
-    assert unknown.applied is None
-    assert unknown.label == "tip, no such input"
+def of_joint(number):
+    """Return what a family says of one joint's signal, as far as pairs ask."""
+    return stub(place=stub(component=number))
+
+
+def test_families_of_two_joints_are_no_rivals_and_one_that_stands_alone_has_to_foretell(offset):
+    families = [
+        Family("mechanics", "A1", "jerk", "smooth", 0.93, of_joint(0)),
+        Family("mechanics", "A3", "jerk", "smooth", 0.4, of_joint(2)),
+        Family("mechanics", "A3", "velocity", "smooth", 0.3, of_joint(2)),
+    ]
+    alone = judgement(offset, verdict="unexplained")
+    assert labels(open_pairs([alone], families)) == [
+        ("A1, jerk", "something else", 0.0651),
+        ("A3, jerk", "A3, velocity", 0.12),
+    ]
 
 
 # --- the choice -------------------------------------------------------------------------------------------
@@ -183,26 +204,95 @@ def test_nothing_open_is_no_run(offset):
     assert next_run_of(context(), []) is None
 
 
-def test_a_gap_of_which_nothing_is_known_is_run_again(offset):
-    unknown = judgement(offset, verdict="unexplained", after=0.3)
+def moved(run, program=0.0):
+    """Return a trace of a run: its program, by where it is, and whether it cuts."""
+    one = TRIALS["sync"].inputs
+    inputs = replace(one, position_mm=one.position_mm + program)
+    return replace(trace(np.zeros((len(one), 3)), "mechanics", inputs=inputs), run=run)
+
+
+def cutting(one):
+    return replace(one, inputs=replace(one.inputs, force_base_N=np.full((len(one.inputs), 3), 10.0)))
+
+
+RUNS = {
+    "one run": [moved("run-1")],
+    "two programs": [moved("run-1"), moved("run-2", 5.0)],
+    "two of one program": [moved("run-1"), moved("run-2")],
+    "two of one program beside another": [moved("run-1"), moved("run-2", 5.0), moved("run-3")],
+    "two of one program, cutting": [cutting(moved("run-1")), cutting(moved("run-2"))],
+    "one of them in air": [cutting(moved("run-1")), moved("run-2"), moved("run-3")],
+}
+AGAIN = ("repeat", ["it comes back", "it happened once"])
+IN_AIR = ["it comes with motion", "it is there at rest too"]
+
+
+@pytest.mark.parametrize(
+    ("runs", "program", "asked"),
+    [
+        ("one run", *AGAIN),
+        ("two programs", *AGAIN),
+        ("two of one program", "circle", IN_AIR),
+        ("two of one program beside another", "circle", IN_AIR),
+        ("two of one program, cutting", "circle", ["it comes with the cut", *IN_AIR]),
+        ("one of them in air", "circle", IN_AIR),
+    ],
+)
+def test_what_is_asked_first_of_a_gap_is_never_what_the_runs_already_show(offset, runs, program, asked):
+    unknown = judgement(offset, verdict="unexplained", after=0.3, runs=RUNS[runs])
     found = next_run_of(context(), [unknown])
-    assert found.program == "repeat"
-    assert found.minutes > TRIALS["sync"].inputs.time_s[-1] / 60.0
+    assert found.program == program
+    assert [each.answer for each in found.expect] == asked
+    assert len({each.shows for each in found.expect}) == len(asked)
+    assert [(each.first, each.second) for each in found.separates] == list(pairwise(asked))
     assert found.separates[0].odds == pytest.approx(math.exp(LIMITS.most_log_odds), rel=0.01)
-    assert [each.answer for each in found.expect] == ["it comes back", "it happened once"]
-    assert "0.3 mm at the tip again" in found.expect[0].shows
 
 
-def test_families_of_the_answer_reach_the_choice(offset):
-    rest = [
-        DependsOnResult(
-            link="mechanics", at="tip", on="wall clock", form="drift", probability=0.6, share=0.5
-        ),
-        DependsOnResult(link="mechanics", at="tip", on="constant", form="smooth", probability=0.3, share=0.5),
+def test_a_blow_is_run_again_only_where_no_other_run_is_of_its_program(offset):
+    def blow(runs):
+        found = judgement(
+            offset, verdict="unexplained", runs=RUNS[runs], impulses=(stub(),), significant=False
+        )
+        return next_run_of(context(), [found])
+
+    assert blow("one run").program == "repeat"
+    assert blow("two of one program") is None
+
+
+@pytest.fixture(scope="module")
+def drifting():
+    """What families say of a tip that drifts along x by 0.3 mm an hour, from a run half an hour in."""
+    t, shift = TRIALS["sync"].inputs.time_s, np.array([1.0, 0.0, 0.0])
+    traces = [
+        replace(
+            trace(
+                (0.3 * (hours + t / 3600.0))[:, None] * shift + noise(len(t), number, SIGMA_MM, 3),
+                "mechanics",
+                number,
+                inputs=replace(TRIALS["sync"].inputs, hours=hours),
+            ),
+            run=f"run-{number + 1}",
+        )
+        for number, hours in enumerate((0.0, 0.5, 1.0))
     ]
-    found = next_run_of(context(), [judgement(offset, verdict="unexplained")], rest)
-    assert isinstance(found, NextRun)
-    assert (found.separates[0].first, found.separates[0].second) == ("tip, wall clock", "tip, constant")
+    found = judge(LINK["mechanics"], traces, [], question([]))
+    return found, {each.on.value: each for each in found.rest.study.evidences if each.place.name == "tip"}
+
+
+def test_families_are_foretold_and_parted_by_the_program_in_which_they_differ(drifting):
+    found, evidences = drifting
+    rest = [
+        (
+            DependsOnResult(link="mechanics", at="tip", on=on, form="drift", probability=0.4, share=0.5),
+            evidences[on],
+        )
+        for on in ("wall clock", "run to run")
+    ]
+    asked = next_run_of(context(1.0), [found], rest)
+    assert (asked.separates[0].first, asked.separates[0].second) == ("tip, wall clock", "tip, run to run")
+    said = {each.answer: each.shows for each in asked.expect}
+    assert len(set(said.values())) == 2
+    assert asked.program == "dwell"
 
 
 def test_without_a_known_robot_no_program_is_simulated(offset):
@@ -223,6 +313,7 @@ def test_what_a_run_shows_is_told_with_its_unit_and_its_time():
     apart = choice("dwell", 1.0, 10.0).partings[0].apart
     assert shown(apart, 0.3) == "+0.3 mm in x at the tip after 1 s"
     assert shown(apart, 0.001) == "nothing above the noise after 1 s"
+    assert shown(apart, 0.3, is_open=True) == "up to 0.3 mm either way in x at the tip after 1 s"
 
 
 def test_a_program_that_parts_nothing_says_so():

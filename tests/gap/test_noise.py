@@ -48,7 +48,8 @@ def test_noise_is_no_more_than_it_is_stated_to_be():
     loud = Noise(np.array([0.9, 0.0, 0.0]), 1.0, 2.3)
     assert at_most(loud, 1.4).sigma == 1.4
     assert not at_most(loud, 1.4).a.any()
-    assert at_most(white(1.0), 1.4).sigma == 1.0
+    assert np.hypot(1.4, at_most(loud, 1.4).beyond) == pytest.approx(loud.short_sigma)
+    assert (at_most(white(1.0), 1.4).sigma, at_most(white(1.0), 1.4).beyond) == (1.0, 0.0)
 
 
 @pytest.mark.parametrize("slow", [(), (Slow(0.97, 1.3),), (Slow(0.9, 0.5), Slow(0.995, 2.0))])

@@ -12,14 +12,17 @@ from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.gap.tell.html.one_file import page, write_page
 from gcode2krl.gap.tell.result import (
     Constancy,
+    Course,
     EffectAt,
+    EventResult,
     Expectation,
     NextRun,
     RivalResult,
+    RunSize,
     Separates,
     Where,
 )
-from tests.gap.answered import BACKLASH, GAP, LAG, STRETCH, UNEXPLAINED, UNSURE, evidence, run_evidence
+from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, UNEXPLAINED, UNSURE, evidence, run_evidence
 
 WHERE = Where(intervals=(STRETCH, replace(STRETCH, share=0.1)))
 RICH = replace(
@@ -160,3 +163,20 @@ def test_the_file_is_written_whole_or_not_at_all(tmp_path):
         write_page(GAP, tmp_path / "no" / "gap.html")
     with pytest.raises(NotUnderstoodError, match="input"):
         write_page(GAP, file, [file])
+
+
+def test_runs_events_and_courses_are_on_the_page():
+    per_run = tuple(
+        RunSize(run=run, rms_before=before, rms_after=0.02, held_out=held)
+        for run, before, held in (("run-1", 0.029, False), ("run-2", 0.159, True))
+    )
+    blow = EventResult(
+        link="force", run="run-2", t_s=11.8, line=42, what="impulse", size=1154.0, unit="N", lasts_s=0.04
+    )
+    course = Course(over="way cut", over_unit="m", unit="mm", points=((0.5, 0.011), (2.5, 0.073)))
+    drift = replace(STEP, on="metres cut", form="smooth", at_time_s=None, run=None, course=course)
+    rest = replace(UNEXPLAINED.unexplained, depends_on=(drift,))
+    gap = replace(UNEXPLAINED.gap, per_run=per_run)
+    text = page(replace(UNEXPLAINED, gap=gap, events=(blow,), unexplained=rest))
+    for said in ("held out: it only tests", "0.159", "an impulse of", "way cut (m)", "0.073"):
+        assert said in text

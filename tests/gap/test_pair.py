@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
@@ -25,8 +26,9 @@ LOG = controller(STAMPS_S, q_cmd_rad=OWN, q_act_rad=OWN + LAG, q_load_rad=OWN + 
 
 
 def at_own(values):
-    """Return differences (n, 6) at the prediction's samples, linearly."""
-    return np.stack([np.interp(INPUTS.time_s, STAMPS_S, column) for column in values.T], axis=1)
+    """Return differences (n, 6) at the prediction's samples."""
+    slopes = np.gradient(values, STAMPS_S, axis=0)
+    return CubicHermiteSpline(STAMPS_S, values, slopes)(np.clip(INPUTS.time_s, STAMPS_S[0], STAMPS_S[-1]))
 
 
 def table(kind, **columns):

@@ -1,5 +1,6 @@
 """The gap at the part: millimetres whatever signal shows it best, seconds for clocks, newtons at last."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PART, PATH, SERVO
 from gcode2krl.gap.choose.gap_size import Size
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.part_size import at_part, at_part_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of, run_sizes
 from gcode2krl.gap.tell.residuals import Residual
 from tests.gap.constructed import motion, trace
 from tests.gap.synthetic import applied
@@ -87,9 +88,49 @@ def test_a_scan_is_the_part_and_joints_of_an_unknown_robot_stay_joints():
     part = Judged(link=PART, verdict="explained", causes=(), size=SIZE, held_out=True, factor=1.0)
     assert at_part([part], {}, None).what == "part"
     one = bent(1, 1e-3)
-    nowhere = SimpleNamespace(trace=SimpleNamespace(inputs=SimpleNamespace(position_mm=np.zeros((5, 3)))))
+    nowhere = replace(one, trace=replace(one.trace, inputs=replace(motion(), position_mm=np.zeros((500, 3)))))
     assert at_part([judged(GEAR)], {GEAR: [nowhere]}, None).what == "joints"
     assert at_part([judged(GEAR)], {GEAR: [one]}, None).what == "tip"
+
+
+def tip(run, mm, number=0):
+    """Return the residual of a tip that is off by a length all the time, and half of it with the causes."""
+    values = np.tile([0.0, mm, 0.0], (500, 1))
+    one = replace(trace(values, "mechanics", number), run=run)
+    return Residual(trace=one, before=values, after=values / 2.0, shape=values, noise=np.full(3, 1e-2))
+
+
+def test_the_size_is_that_of_all_runs_and_each_run_is_told():
+    off = [tip("run-1", 1.0), tip("run-2", 3.0, 1)]
+    one = judged(MECHANICS, traces=(off[0].trace,))
+    found = at_part([one], {MECHANICS: off}, None)
+    assert found.rms_before == pytest.approx(10.0 * np.sqrt(5.0))
+    assert (found.held_out_before, found.rms_after) == (20.0, 10.0)
+    assert found.per_run == run_sizes(one, off)
+    assert [(each.run, each.rms_before, each.rms_after, each.held_out) for each in found.per_run] == [
+        ("run-1", pytest.approx(10.0), pytest.approx(5.0), False),
+        ("run-2", pytest.approx(30.0), pytest.approx(15.0), True),
+    ]
+
+
+def test_a_gap_in_joints_is_told_at_the_tip_in_each_run_and_one_of_timing_in_seconds():
+    gear = judged(GEAR)
+    (run,) = at_part([gear], {GEAR: [bent(1, 1e-3)]}, None).per_run
+    assert run.rms_before == pytest.approx(at_part([gear], {GEAR: [bent(1, 1e-3)]}, None).rms_before)
+    assert run.rms_after is None
+    one = trace(np.zeros((500, 6)), "path", inputs=motion())
+    late = [
+        trace(-late_s * one.rate, "path", number, inputs=motion())
+        for number, late_s in enumerate((0.05, 0.1))
+    ]
+    path = judged(PATH, traces=(late[0],))
+    path = replace(path, every=tuple(late))
+    told = at_part([path], {}, path)
+    assert [(each.rms_before, each.held_out) for each in told.per_run] == [
+        (pytest.approx(0.05, rel=1e-3), False),
+        (pytest.approx(0.1, rel=1e-3), True),
+    ]
+    assert told.rms_before == pytest.approx(np.sqrt((0.05**2 + 0.1**2) / 2.0), rel=1e-3)
 
 
 def test_slips():

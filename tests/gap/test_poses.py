@@ -11,7 +11,7 @@ from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.beside.links import MECHANICS
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.poses import is_of_poses
-from gcode2krl.gap.fit.pose_noise import noise_of_poses
+from gcode2krl.gap.fit.pose_noise import noise_of_poses, revisits
 from gcode2krl.runs import load_run
 
 pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
@@ -23,16 +23,25 @@ POSES = 60
 SIGMA_MM = 0.02
 
 
-def written(folder, offset_deg=(0.0,) * 6, seed=1, head="[noise]\ntcp_mm = 0.02\n", time="t_s", extra=""):
+def written(
+    folder,
+    offset_deg=(0.0,) * 6,
+    seed=1,
+    head="[noise]\ntcp_mm = 0.02\n",
+    time="t_s",
+    extra="",
+    poses=POSES,
+    visits=1,
+):
     """Write a run of poses of a robot whose joints are off by some degrees; return it as read."""
     generator = np.random.default_rng(seed)
     middle = np.array([0.0, -90.0, 100.0, 20.0, 40.0, 10.0])
-    q_deg = middle + generator.uniform(-35.0, 35.0, (POSES, 6))
+    q_deg = np.tile(middle + generator.uniform(-35.0, 35.0, (poses, 6)), (visits, 1))
     tip, _ = robot.forward(np.radians(q_deg + offset_deg), CELL, 1)
     tip = tip + SIGMA_MM * generator.standard_normal(tip.shape)
     names = [time, *(f"q{n}_deg" for n in range(1, 7)), "x_mm", "y_mm", "z_mm", "temp1_C", "ambient_C"]
     lines = [",".join(names)]
-    for n in range(POSES):
+    for n in range(len(q_deg)):
         when = f"2024-05-06T07:{n:02d}:30" if time == "time" else f"{30.0 * n:g}"
         warm = "" if n == 3 else f"{20.0 + 0.1 * n:.2f}"
         lines.append(
@@ -109,8 +118,35 @@ def test_noise_is_white_and_as_stated_or_what_nothing_explains(tmp_path):
         assert len(noise.a) == 0
         assert noise.sigma == pytest.approx(SIGMA_MM, rel=0.15)
     many = np.random.default_rng(4).standard_normal((3, POSES, 150))
-    assert noise_of_poses([pushed], [many], [[]])[0].sigma > 1.0  # too few poses for so many forms
+    assert noise_of_poses([pushed], [many], [[]])[0].sigma > 1.0  # too few poses, and no one form fits
     assert noise_of_poses([replace(pushed, declared_sigma=0.5)], [form], [[]])[0].sigma == 0.5
+
+
+def test_few_poses_without_stated_noise_do_not_make_the_gap_noise(tmp_path):
+    """A dozen of poses beside a hundred forms and all of normal mismatch."""
+    off = written(tmp_path / "off", offset_deg=(0.0, 0.05, 0.0, 0.0, 0.0, 0.0), head="", poses=12)
+    gap = diagnose_log([off], CELL)
+    assert [(cause.effect, cause.target) for cause in gap.named_causes] == [("mastering", "A2")]
+    (link,) = [each for each in gap.links if each.link == "mechanics"]
+    assert link.noise.learnt == pytest.approx(SIGMA_MM, rel=0.35)
+    assert link.noise.source == "what no effect explains"
+    for seed in range(2):
+        sound = diagnose_log([written(tmp_path / f"{seed}", seed=seed, head="", poses=12)], CELL)
+        assert sound.verdict == "no_gap"
+        assert not [issue.code for issue in sound.issues]
+        assert any("neither stated nor repeated" in note and "would be a gap" in note for note in sound.notes)
+
+
+def test_poses_visited_again_tell_the_noise(tmp_path):
+    off = written(tmp_path / "off", offset_deg=(0.0, 0.05, 0.0, 0.0, 0.0, 0.0), head="", poses=20, visits=3)
+    (link,) = [each for each in diagnose_log([off], CELL).links if each.link == "mechanics"]
+    assert link.noise.learnt == pytest.approx(SIGMA_MM, rel=0.15)
+    assert link.noise.source == "repeats"
+    (trace,) = MECHANICS.traces(log_pairs([off], CELL))
+    assert len(revisits([trace])) == 60
+    # readings in a row, at which it stands, are one visit
+    stood = replace(trace.inputs, q_cmd_rad=np.repeat(trace.inputs.q_cmd_rad[:20], 3, axis=0))
+    assert len(revisits([replace(trace, inputs=stood)])) == 0
 
 
 def test_a_wrong_mastering_is_found_from_poses(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 
 from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.gap.tell.report import left_lines, text_report, where_words, worst
-from gcode2krl.gap.tell.result import EffectAt, Expectation, NextRun, Separates, Where
+from gcode2krl.gap.tell.result import EffectAt, EventResult, Expectation, NextRun, RunSize, Separates, Where
 from tests.gap.answered import BACKLASH, GAP, STRETCH, UNEXPLAINED, UNSURE
 
 
@@ -88,3 +88,19 @@ def test_how_much_the_printed_stretches_hold():
 def test_an_empty_report_is_its_sentence():
     bare = replace(GAP, verdict="no_gap", links=(), causes=(), not_examined=())
     assert text_report(bare) == headline(bare)
+
+
+def test_runs_and_what_happened_have_sections_of_their_own():
+    sizes = [("run-1", 0.029, False), ("run-2", 0.159, True)]
+    per_run = tuple(
+        RunSize(run=run, rms_before=before, rms_after=0.02, held_out=held) for run, before, held in sizes
+    )
+    blow = EventResult(
+        link="force", run="run-2", t_s=11.8, line=42, what="impulse", size=1154.0, unit="N", lasts_s=0.04
+    )
+    said = text_report(replace(GAP, gap=replace(GAP.gap, per_run=per_run), events=(blow,)))
+    assert "run by run, those that explain included; the table above is of data not used" in said
+    assert "  run-1: 0.029 mm RMS, 0.02 with the named causes\n" in said
+    assert "  run-2: 0.159 mm RMS, 0.02 with the named causes, held out\n" in said
+    assert "what happened\n  11.80 s of run-2, line 42: an impulse of 1154 N in force, for 40 ms\n" in said
+    assert "run by run" not in text_report(GAP)

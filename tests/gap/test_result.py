@@ -54,4 +54,4 @@ def test_results_are_frozen():
 
 def test_nothing_compared_is_none_and_not_zero():
     size = result.GapSize(signal="tcp", unit="mm")
-    assert {getattr(size, entry.name) for entry in fields(size)[2:]} == {None, False}
+    assert {getattr(size, entry.name) for entry in fields(size)[2:]} == {None, False, ()}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import Constancy, EffectAt, Expectation, NextRun, Separates
+from gcode2krl.gap.tell.result import Constancy, Course, EffectAt, Expectation, NextRun, Separates, UnknownAt
 from gcode2krl.gap.tell.words import (
     alike,
     depends,
@@ -93,6 +93,10 @@ def test_lists_and_what_a_cause_cannot_be_told_from():
     assert [listed([]), listed(["a"]), listed(["a", "b", "c"])] == ["", "a", "a, b and c"]
     others = [EffectAt("mastering", "A1"), EffectAt("base_frame", None)]
     assert alike(others) == "mastering of A1 or base frame"
+    unknown = UnknownAt("A2", "reversals")
+    assert alike([others[0], unknown]) == (
+        "mastering of A1 or something that the library lacks (A2, reversals)"
+    )
 
 
 def test_dependences():
@@ -104,6 +108,30 @@ def test_dependences():
     assert depends(replace(loop, form="drift", on="wall clock", size=None)) == "A2, a drift with wall clock"
     assert depends(replace(loop, form="else", size=None)) == "A2, a function of own torque"
     assert depends(replace(loop, at="fz", size=None)) == "force, a loop with own torque"
+
+
+def test_a_tone_has_its_frequency_and_a_course_its_ends_and_its_bend():
+    tone = replace(
+        STEP, on="tone", form="periodic", at_time_s=None, run=None, frequency_hz=7.304, direction=None
+    )
+    assert depends(tone) == "tip, a tone of 7.3 Hz, 0.14 mm"
+    assert what_there_is(tone) == "a tone of 7.3 Hz at the tip, 0.14 mm"
+    drift = replace(tone, on="time in the run", form="drift", frequency_hz=None)
+    rising = Course(
+        over="time in the run",
+        over_unit="s",
+        unit="mm",
+        points=((1.0, 0.0), (5.0, 0.08), (9.0, 0.14)),
+        run="run-2",
+    )
+    assert depends(replace(drift, course=rising)) == (
+        "tip, a drift with time in the run, 0.14 mm, over time in the run of run-2: "
+        "0 mm at 1.0 s to 0.14 mm at 9.0 s"
+    )
+    bent = replace(rising, points=((1.0, 0.0), (5.0, 0.14), (9.0, 0.02)), run=None)
+    assert depends(replace(drift, course=bent)).endswith(
+        "over time in the run: 0 mm at 1.0 s to 0.14 mm at 5.0 s to 0.020 mm at 9.0 s"
+    )
 
 
 def test_dependences_within_a_sentence():

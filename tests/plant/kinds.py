@@ -29,6 +29,7 @@ KINDS = (
     "slip",
     "confounded",
     "missing",
+    "story",
 )
 CLEAR = (1.0, 4.0)  # ratio of a case in which the answer must be seen
 MISSING = {  # what a person may not have
@@ -40,6 +41,15 @@ MISSING = {  # what a person may not have
     "no_torques": tuple(f"tau{j}_Nm" for j in range(1, 7)),
     "no_moments": ("mx_Nm", "my_Nm", "mz_Nm"),
 }
+
+
+STORIES: dict[str, tuple[str, tuple[float, float] | None]] = {  # what happens, and its size where it is told
+    "collision": ("collision@A2", (900.0, 1300.0)),  # 1.1 kN for 10 to 30 ms; A2 has slipped from then on
+    "jerk": ("jerk_feed_forward", None),
+    "jerk_of_all": ("jerk_feed_forward@all", None),
+    "snag": ("open:cable_jerks_free", None),
+}
+"""Plain events: what happens at which moment (`effects[].moments` of the label) has to be told."""
 
 
 def draw_case(
@@ -147,7 +157,16 @@ def _missing(rng: np.random.Generator, options: Options) -> tuple[Options, dict]
     return replace(options, effect=effect, missing=MISSING[what]), {"missing": what}
 
 
+def _story(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
+    name = options.effect or str(rng.choice(sorted(STORIES)))
+    if name not in STORIES:
+        raise ValueError(f"no story {name!r}; known: {', '.join(STORIES)}")
+    effect, sized = STORIES[name]
+    return replace(options, effect=effect, form="same", ratios=CLEAR, sized=sized), {"story": name}
+
+
 BUILDERS = {
+    "story": _story,
     "null_foreign_noise": _foreign_noise,
     "null_foreign_mismatch": _foreign_mismatch,
     "double": _double,

@@ -5,12 +5,16 @@ from dataclasses import asdict
 from tests.plant import beyond, imitation, instruments, truth
 from tests.plant import faults as acting
 from tests.plant.effects import LIBRARY, SLIPS
+from tests.plant.effects.registry import ALL
 from tests.plant.faults import Fault
 from tests.plant.instruments import Instruments
 from tests.plant.plans import Plan
 from tests.plant.robot import Run
+from tests.plant.scene import JOINTS
 
-MANY_JOINTS = {"wrist_coupling": ("A5", "A6")}
+MANY_JOINTS = {"wrist_coupling": ("A5", "A6"), "axis_coupling": ("A3", "A2")}
+OF_ALL = ("held_set_points", "supply_sags")
+"""Unknown effects that act in all joints at once."""
 SCHEMA = "plant/label/2"
 
 
@@ -112,6 +116,10 @@ def _entry(fault: Fault, size: float, changes: list[dict], sized: dict[str, dict
             "links": list(depends.links),
         },
     }
+    if "moments" in values:
+        entry["moments"] = values["moments"]
+    elif fault.kind.moments and above:
+        entry["moments"] = truth.moments(changes, main)
     if depends.form == "step" and "at_s" in values:
         entry["step"] = {k: values[k] for k in ("run", "at_s", "size", "unit", "direction") if k in values}
     return entry
@@ -121,7 +129,9 @@ def _joints(fault: Fault) -> list[str]:
     """Joints that an effect acts in."""
     if fault.kind.name in MANY_JOINTS:
         return list(MANY_JOINTS[fault.kind.name])
-    return [fault.target] if fault.target in ("A1", "A2", "A3", "A4", "A5", "A6") else []
+    if fault.target == ALL or fault.kind.name in OF_ALL:
+        return list(JOINTS)
+    return [fault.target] if fault.target in JOINTS else []
 
 
 def _spans(per_run: list) -> list[dict]:

@@ -132,3 +132,47 @@ def coloured(white, memory):
     for i in range(1, len(white)):
         out[i] = memory * out[i - 1] + fresh * white[i]
     return out
+
+
+@njit(cache=True, nogil=True)
+def limited(x, most, hz, dt_s):
+    """Place of a drive that follows `x` with a second-order loop, its acceleration at most `most`.
+
+    The command's own acceleration is fed forward, so that without a limit nothing lags.
+    """
+    out = x.copy()
+    w = 2.0 * np.pi * hz
+    for i in range(2, len(x)):
+        push = (x[i] - 2.0 * x[i - 1] + x[i - 2]) / dt_s**2
+        off, before = x[i - 1] - out[i - 1], x[i - 2] - out[i - 2]
+        a = push + 1.6 * w * (off - before) / dt_s + w * w * off
+        a = min(max(a, -most), most)
+        out[i] = 2.0 * out[i - 1] - out[i - 2] + a * dt_s * dt_s
+    return out
+
+
+@njit(cache=True, nogil=True)
+def dahl(x, soft):
+    """Wind-up in -1 ... 1 by travel: dw = (sign(dx) - w)·|dx|/soft, exactly over each step."""
+    out = np.zeros_like(x)
+    w = 0.0
+    for i in range(1, len(x)):
+        d = x[i] - x[i - 1]
+        if d != 0.0:
+            side = 1.0 if d > 0.0 else -1.0
+            w = side + (w - side) * np.exp(-abs(d) / soft)
+        out[i] = w
+    return out
+
+
+@njit(cache=True, nogil=True)
+def ratchet(load, hold):
+    """Steps taken: one each time that a load comes above `hold`, and none back."""
+    out = np.zeros_like(load)
+    count, above = 0.0, False
+    for i in range(len(load)):
+        if load[i] > hold and not above:
+            count += 1.0
+        above = load[i] > 0.8 * hold if above else load[i] > hold
+        out[i] = count
+    return out

@@ -29,6 +29,7 @@ class Options:
     foreign_noise: bool = False
     missing: tuple[str, ...] = ()  # tables, or columns of the controller's log
     ratios: tuple[float, float] = acting.RATIOS
+    sized: tuple[float, float] | None = None  # the size lies between these, whatever the noise
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,10 @@ class Plan:
         """Size of each fault."""
         out = []
         for fault, luck in zip(self.faults, self.luck, strict=True):
+            if self.options.sized is not None:
+                low, high = self.options.sized
+                out.append(float(low * (high / low) ** luck))
+                continue
 
             def drive(index: int, size: float, fault: Fault = fault) -> Run:
                 return self.drive(self.days[index], [fault.hooks(size)])

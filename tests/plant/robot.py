@@ -264,6 +264,28 @@ def _sense(run: Run) -> None:
     run.sensed_Nmm = np.einsum("nji,nj->ni", flange, moment) * run.mismatch.gain
 
 
+def _unbent(run: Run) -> None:
+    run.extra_rad = np.zeros((len(run.slow_s), 6))
+
+
+def _measured(run: Run) -> None:
+    _frame(run)
+    _sense(run)
+
+
+STAGES: dict[str, Callable[[Run], None] | None] = {  # what is done before the hooks of each stage
+    "world": None,
+    "command": _command,
+    "lags": None,
+    "servo": _servo,
+    "gear": _gear,
+    "load": take_cut,
+    "bend": _unbent,
+    "tip": _structure,
+    "sense": _measured,
+}
+
+
 def simulate(
     way: Waypoints | Track,
     world: World,
@@ -277,27 +299,10 @@ def simulate(
     """Drive waypoints or a track with these effects at work."""
     run = Run(way, world, mismatch or Mismatch(), age_s)
     run.number, run.pauses, run.spindle = number, pauses, spindle
-
-    def at(stage: str) -> None:
+    for stage, work in STAGES.items():
+        if work is not None:
+            work(run)
         for hooks in effects:
             if stage in hooks:
                 hooks[stage](run)
-
-    at("world")
-    _command(run)
-    at("command")
-    at("lags")
-    _servo(run)
-    at("servo")
-    _gear(run)
-    at("gear")
-    take_cut(run)
-    at("load")
-    run.extra_rad = np.zeros((len(run.slow_s), 6))
-    at("bend")
-    _structure(run)
-    at("tip")
-    _frame(run)
-    _sense(run)
-    at("sense")
     return run

@@ -30,9 +30,17 @@ NO_MATTER_OF_DEGREE = {  # a stop, a skew, another curve or window is there or i
 }
 
 
-LATE = ("step", "tool_chips", "crane_passes")  # in one of the runs, or from one of them on
+LATE = (
+    "step",
+    "tool_chips",
+    "crane_passes",
+    "collision",
+    "cable_jerks_free",
+)  # in one of the runs, or from one of them on
 
-FAR = {"encoder_drop_out": "slots"}  # not to be seen on two rows
+FAR = dict.fromkeys(
+    ("encoder_drop_out", "collision", "bolt_ratchet", "cable_jerks_free", "preload_jump"), "slots"
+)  # not to be seen on two rows
 
 
 def middle(kind) -> float:

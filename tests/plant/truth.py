@@ -123,3 +123,18 @@ def above_noise(per_run: list[dict], signal: str, how: Instruments) -> list[list
         power = np.convolve(np.sum(change**2, axis=1), np.ones(width) / width, mode="same")
         out.append(_joined(_spans(np.sqrt(power) > noise_of(signal, how), t)))
     return out
+
+
+def moments(per_run: list[dict], signal: str, most: int = 8) -> list[dict]:
+    """Times at which a change is largest, each more than `APART_s` from the others, the largest first."""
+    every = []
+    for i, run in enumerate(per_run):
+        t, change = run[signal]
+        every += [(float(s), i, float(at)) for s, at in zip(np.linalg.norm(change, axis=1), t, strict=True)]
+    out: list[tuple[int, float]] = []
+    for _, i, at in sorted(every, reverse=True):
+        if all(i != other or abs(at - there) > APART_s for other, there in out):
+            out.append((i, at))
+        if len(out) == most:
+            break
+    return [{"run": f"run-{i + 1}", "t_s": at} for i, at in out]

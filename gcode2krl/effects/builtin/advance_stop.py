@@ -22,7 +22,7 @@ class AdvanceStop(Effect):
     family = "timing"
     links = frozenset({"timing", "path"})
     where = frozenset({Where.JOINT})
-    depends_on = frozenset({Dependence.VELOCITY, Dependence.TRAVEL})
+    depends_on = frozenset({Dependence.STOPS, Dependence.VELOCITY, Dependence.TRAVEL})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(

@@ -4,7 +4,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, every_joint
+from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
 from gcode2krl.effects.parameter import Parameter, Role
@@ -24,7 +24,7 @@ class Backlash(Effect):
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.REVERSALS})
     is_nuisance = True
-    targets = staticmethod(every_joint)
+    targets = staticmethod(every_joint_and_all)
     parameters = (
         Parameter(
             name="gap_deg",
@@ -43,7 +43,8 @@ class Backlash(Effect):
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gear."""
         q = np.array(q_load_rad)
-        q[:, applied.joint] = play(q[:, applied.joint], applied["gap_deg"] * RAD_PER_DEG / 2.0)
+        for axis in applied.axes:
+            q[:, axis] = play(q[:, axis], applied["gap_deg"] * RAD_PER_DEG / 2.0)
         return q
 
 

@@ -21,7 +21,7 @@ class Corner(Effect):
     family = "timing"
     links = frozenset({"timing", "path"})
     where = frozenset({Where.JOINT})
-    depends_on = frozenset({Dependence.VELOCITY, Dependence.TRAVEL, Dependence.PLACE})
+    depends_on = frozenset({Dependence.CORNERS, Dependence.VELOCITY, Dependence.TRAVEL, Dependence.PLACE})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(

@@ -4,14 +4,18 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.effects.effect import Applied, Effect, every_joint
+from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
 from gcode2krl.effects.parameter import Parameter, Role
 
 
 class ServoLag(Effect):
-    """First order: tau·q_act' + q_act = q_cmd, from rest."""
+    """First order: tau·q_act' + q_act = q_cmd, from rest.
+
+    To first order q_act is tau late, as with `dead_time`, `servo_gain` and a `clock` of q_cmd; the second
+    order differs: tau²·q'' here, half of that for a pure delay.
+    """
 
     name = "servo_lag"
     family = "timing"
@@ -19,7 +23,7 @@ class ServoLag(Effect):
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.VELOCITY})
     is_nuisance = True
-    targets = staticmethod(every_joint)
+    targets = staticmethod(every_joint_and_all)
     parameters = (
         Parameter(
             name="tau_s",
@@ -41,7 +45,8 @@ class ServoLag(Effect):
         if applied["tau_s"] <= 0.0:
             return q_act_rad
         q = np.array(q_act_rad)
-        q[:, applied.joint] = lag(q[:, applied.joint], inputs.time_s, applied["tau_s"])
+        for axis in applied.axes:
+            q[:, axis] = lag(q[:, axis], inputs.time_s, applied["tau_s"])
         return q
 
 

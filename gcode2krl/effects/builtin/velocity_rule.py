@@ -21,7 +21,7 @@ class VelocityRule(Effect):
     family = "timing"
     links = frozenset({"timing", "path"})
     where = frozenset({Where.JOINT})
-    depends_on = frozenset({Dependence.VELOCITY, Dependence.TRAVEL})
+    depends_on = frozenset({Dependence.VELOCITY, Dependence.ACCELERATION, Dependence.TRAVEL})
     needs = frozenset({"plan"})
     parameters = (
         Parameter(

@@ -13,6 +13,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import arm
 from gcode2krl.effects.inputs import gradient
 from gcode2krl.effects.operators import lag, play, since_reversal
+from gcode2krl.gap.beside.corners import Corners
 from gcode2krl.gap.beside.interpolation import linear, nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.units import MM_PER_M
@@ -21,10 +22,14 @@ _PLAYS_RAD = (1e-4, 1e-3, 1e-2)
 """Half-widths of play: 0.006°, 0.06° and 0.6° cover what gears have."""
 _SETTLES_S = (0.05, 0.3)
 """After a reversal: a stick-slip spike, and what an arm needs to come to rest."""
+_FOLLOWS_S = (0.004, 0.01, 0.025)
+"""Time constants of a servo's two lags behind a jerk."""
 _WARMS_S = (2.0, 8.0, 30.0)
 """Time constants with which a spindle grows after it has started."""
-_PLAYS_TORQUE = (0.1, 0.4)
-"""Half-widths of play of a torque, over its range."""
+_PLAYS_LOAD = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""Widths of play of a torque or a force, over its range; a sum of plays is any smooth loop."""
+_LATE_S = tuple(0.002 * 1.4**i for i in range(14))
+"""Delays of a force, to 0.16 s: a sensor's chain alone has 5 to 50 ms, with the robot's reaction 150 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +101,10 @@ class Admissible:
         """(n, 3, 3) rotations of the tool."""
         return self.trace.inputs.tool_rotation[self._nearest]
 
+    def as_stated(self, vectors: Floats) -> Floats:
+        """Return vectors (n, 3) along ``$BASE`` along the axes in which the signal is stated."""
+        return self.trace.as_stated(vectors, self._nearest)
+
     @cached_property
     def force_N(self) -> Floats:
         """(n, 3) the force that bends the arm: the measured one where the model has it."""
@@ -126,6 +135,33 @@ class Admissible:
         logged = self.trace.inputs.temperature_C
         return np.zeros((len(self.trace.time_s), 0)) if logged is None else self._at(logged)
 
+    # What the controller plans
+
+    @cached_property
+    def roundings(self) -> Floats:
+        """(n, w, 6) what rounding corners over each of some widths does to the commanded joints."""
+        wide = self._corners.roundings
+        return self._at(wide.reshape(len(wide), -1)).reshape(-1, *wide.shape[1:])
+
+    @cached_property
+    def late_by_rounding(self) -> Floats:
+        """(n, 2) how late larger corners make a run, and corners passed so far."""
+        return self._at(self._corners.late_by_rounding)
+
+    @cached_property
+    def late_by_ramps(self) -> Floats:
+        """(n, 4) speed gained and lost so far, stops so far, acceleration along the path, and speed."""
+        return self._at(self._corners.late_by_ramps)
+
+    @cached_property
+    def corners_passed(self) -> Floats:
+        """(n, c) 1 from each blended corner on."""
+        return self._corners.passed[self._nearest]
+
+    @cached_property
+    def _corners(self) -> Corners:
+        return Corners(self.trace.inputs)
+
     # Joints
 
     @cached_property
@@ -142,6 +178,13 @@ class Admissible:
     def acceleration_rad_s2(self) -> Floats:
         """(n, 6) accelerations of the joints."""
         return self._at(gradient(self._rate, self.trace.inputs.time_s))
+
+    def jerk(self, joint: int) -> Floats:
+        """Return how fast a joint's commanded acceleration changes, (n, c), as servos follow it."""
+        inputs = self.trace.inputs
+        jerk = gradient(gradient(self._rate[:, joint], inputs.time_s), inputs.time_s)
+        follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]
+        return self._at(np.stack(follows, axis=1))
 
     @cached_property
     def _rate(self) -> Floats:
@@ -165,10 +208,24 @@ class Admissible:
 
     def torque_with_memory(self, joint: int) -> Floats:
         """Return what play operators leave of a joint's torque (n, c)."""
-        torque = np.ascontiguousarray(self._torque[:, joint])
-        reach = float(np.ptp(torque))
-        plays = [torque - play(torque, 0.5 * share * reach) for share in _PLAYS_TORQUE]
-        return self._at(np.stack(plays, axis=1))
+        return self._at(_plays(self._torque[:, joint]))
+
+    def late(self) -> Floats:
+        """Return by how much the signal (k, n, c) differs where it is late: by a time, or as a filter is."""
+        trace, nominal = self.trace, self.trace.nominal
+        shifted = [trace.late(by_s) - nominal for by_s in _LATE_S]
+        filtered = [
+            np.stack([lag(each, trace.time_s, by_s) for each in (nominal - nominal[:1]).T], axis=1)
+            - (nominal - nominal[:1])
+            for by_s in _LATE_S
+        ]
+        late: Floats = np.moveaxis(np.stack([*shifted, *filtered]), (0, 1, 2), (2, 1, 0))
+        return late
+
+    @cached_property
+    def with_memory(self) -> Floats:
+        """(k, n, c) the signal itself and what play operators leave of it, of each component by itself."""
+        return np.stack([np.column_stack([own, _plays(own)]) for own in self.trace.nominal.T])
 
     @cached_property
     def jacobian(self) -> Floats:
@@ -195,3 +252,10 @@ class Admissible:
         load = np.abs(self._torque[:, joint])
         loaded = direction * load / max(float(load.max(initial=0.0)), 1e-12)
         return np.stack([direction, *plays, *settling, loaded], axis=1)[self._nearest]
+
+
+def _plays(values: Floats) -> Floats:
+    """Return what play operators of several widths leave of values (n,), (n, c)."""
+    values = np.ascontiguousarray(values)
+    reach = float(np.ptp(values))
+    return np.stack([values - play(values, 0.5 * share * reach) for share in _PLAYS_LOAD], axis=1)

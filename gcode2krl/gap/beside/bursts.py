@@ -1,19 +1,14 @@
-"""Bursts and outliers of an instrument: rows that are left out, as rows without a value are.
+"""Bursts and outliers: rows in which a signal is far rougher than usual; `events` says whose they are.
 
 Fourth differences of measured less model have nothing of drifts, effects and vibration of some tens of hertz,
 and of a jump a few rows only; in a burst their median over a tenth of a second rises. A single row far from
 its neighbours, which agree with each other, is an outlier. A component of which more than a small part would
-go keeps all its rows: that is then how the instrument, or what it sees, is.
+go has neither: that is then how the instrument, or what it sees, is.
 """
-
-from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
-from gcode2krl.gap.beside.holdout import with_rows
-from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 LIMITS = THRESHOLDS.beside
@@ -21,22 +16,6 @@ _WEIGHTS = (1.0, -4.0, 6.0, -4.0, 1.0)
 _LEAST_WINDOW = 9
 """Rows, so that the differences around one jump are fewer than half of a window."""
 _LEAST_SCALE = 1e-12
-
-
-def without_bursts(traces: Sequence[Trace]) -> list[Trace]:
-    """Return traces without rows in which their instrument was far noisier than usual."""
-    return [_without(trace) for trace in traces]
-
-
-def _without(trace: Trace) -> Trace:
-    if not trace.link.has_instrument:
-        return trace
-    loud = loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
-    if not loud.any():
-        return trace
-    kept = with_rows(trace, ~loud)
-    told = f"{int(loud.sum())} of {len(loud)} rows: bursts or outliers of the instrument"
-    return replace(kept, left_out=(*kept.left_out, told))
 
 
 def loud_rows(time_s: Floats, values: Floats, segments: Ints, model: Floats | None = None) -> Bools:

@@ -15,7 +15,7 @@ CLOCK, ENCODER_ZERO = "table clock", "encoder zero"
 """Names of two words, so that no effect can have such a name."""
 ROUGH = 1e3
 """Standard deviation of a quantity that is never reported, however large, in units of its bound."""
-_KNOTS_S = 1.0
+_KNOTS_S, _MOST_KNOTS = 1.0, 120
 
 
 def _stacked(values: Floats) -> Floats:
@@ -68,7 +68,7 @@ def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
 def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     """Return (k, n, c): the signal's rate times hats over time, for a time law that is slightly off."""
     start, end = trace.time_s[0], trace.time_s[-1]
-    knots = np.linspace(start, end, max(2, round((end - start) / _KNOTS_S) + 1))
+    knots = np.linspace(start, end, max(2, min(round((end - start) / _KNOTS_S), _MOST_KNOTS) + 1))
     hats = np.maximum(0.0, 1.0 - np.abs(trace.time_s[:, None] - knots) / (knots[1] - knots[0]))
     columns: Floats = -_stacked(trace.rate)[:, :, None] * hats[None]
     return columns * sigma(mismatch.clock_s)

@@ -116,7 +116,7 @@ class Pair:
         if difference is None:
             reference = cubic(stamps, inputs.time_s, inputs.q_cmd_rad) if before_rad is None else before_rad
             difference = measured - reference
-        apart = linear(inputs.time_s, stamps, np.nan_to_num(difference))
+        apart = cubic(inputs.time_s, stamps, np.nan_to_num(difference))
         apart[:, np.isnan(measured).all(axis=0)] = np.nan
         return apart
 

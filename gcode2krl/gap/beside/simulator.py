@@ -6,6 +6,7 @@ from hashlib import blake2b
 from weakref import WeakKeyDictionary
 
 from gcode2krl.effects import Applied, Inputs, Signals, commanded
+from gcode2krl.gap.beside.planning import with_corners
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 LIMITS = THRESHOLDS.beside
@@ -20,6 +21,7 @@ class Simulator:
     def __init__(self) -> None:
         self._kept: OrderedDict[Hashable, Signals] = OrderedDict()
         self._digests: WeakKeyDictionary[Inputs, bytes] = WeakKeyDictionary()
+        self._fine: dict[bytes, Inputs] = {}
 
     def commanded(self, inputs: Inputs, applied: Sequence[Applied]) -> Signals:
         """Return the signals of the commanded path with effects at work, clocks included."""
@@ -30,10 +32,20 @@ class Simulator:
             self._digests[inputs] = _digest(inputs)
         key = (self._digests[inputs], effects)
         if key not in self._kept:
-            self._kept[key] = commanded(inputs, applied)
+            self._kept[key] = commanded(self._with_corners(inputs), applied)
             if len(self._kept) > LIMITS.remembered_paths:
                 self._kept.popitem(last=False)
         return self._kept[key]
+
+    def _with_corners(self, inputs: Inputs) -> Inputs:
+        """Return the inputs sampled often enough for corners, made once."""
+        digest = self._digests[inputs]
+        if digest not in self._fine:
+            fine = with_corners(inputs)
+            if fine is inputs:
+                return inputs
+            self._fine[digest] = fine
+        return self._fine[digest]
 
 
 def _digest(inputs: Inputs) -> bytes:

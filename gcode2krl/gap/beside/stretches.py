@@ -12,8 +12,14 @@ STRETCH_S = THRESHOLDS.beside.stretch_s
 
 
 def stretches_of(trace: Trace) -> Ints:
-    """Return the number (n,) of the stretch of time each row of a trace belongs to."""
-    number: Ints = ((trace.time_s - trace.inputs.time_s[0]) / STRETCH_S).astype(np.int64)
+    """Return the number (n,) of the stretch of time each row of a trace belongs to.
+
+    Of a long run they are longer, so that what is kept of each does not grow with it.
+    """
+    since_s = trace.time_s - trace.inputs.time_s[0]
+    longest_s = (float(since_s[-1]) + 1e-6) / THRESHOLDS.beside.stretches_most
+    lasts_s = max(STRETCH_S, longest_s)
+    number: Ints = (since_s / lasts_s).astype(np.int64)
     return number
 
 

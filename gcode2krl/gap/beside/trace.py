@@ -3,15 +3,19 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.interpolation import LastPath, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from gcode2krl.gap.beside.events import Event
 
 LIMITS = THRESHOLDS.beside
 
@@ -108,6 +112,8 @@ class Trace:
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
     """What was taken out of the measured values because it is the instrument's, in a person's words."""
+    events: "tuple[Event, ...]" = ()
+    """What was rough or far off for a moment and is not in step with the command (`events`)."""
 
     @property
     def signal(self) -> str:
@@ -164,11 +170,30 @@ class Trace:
         """Of ``plus`` and of ``minus``, whose clocks may differ."""
         return LastPath(), LastPath()
 
+    def late(self, by_s: float) -> Floats:
+        """Return what the model says (n, k) of an instrument that states what was true some time before."""
+        return self._at(self._plain, self.time_s - by_s)
+
+    def as_stated(self, vectors: Floats, rows: Ints) -> Floats:
+        """Return vectors (n, 3) along ``$BASE``, at these rows (n,) of the model, along the signal's axes."""
+        return self._turned(self.inputs, vectors, rows)
+
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
         if not applied:
             return self._at(self._plain, self.time_s)
         return self._at(self._simulated((*self.base, *applied)), self.time_s)
+
+    def model_error(self, applied: Sequence[Applied]) -> Floats:
+        """Return by how much the model may be off (n, k) where it, not noise, is the limit.
+
+        To its accuracy come what its samples miss of a sharp corner: by how much every other one misses more.
+        """
+        signals = self.signals(applied)
+        times = signals.true_time(self.plus, self.time_s)
+        values = values_of(signals, self.plus)[:, list(self.columns)]
+        fine, coarse = cubic(times, signals.time_s, values), cubic(times, signals.time_s[::2], values[::2])
+        return self.link.model_rms + np.abs(fine - coarse)
 
     def signals(self, applied: Sequence[Applied]) -> Signals:
         """Return all signals of the model with these effects at work besides the base."""
@@ -194,12 +219,12 @@ class Trace:
                 values = interpolate(signals, self.plus, times, plus)
                 values = values - interpolate(signals, self.minus, other, minus)
         if self.in_sensor_frame or self.in_tool_frame:
-            values = self._turned(signals, values, times)
+            values = self._turned(signals.inputs, values, nearest_rows(signals.inputs.time_s, times))
         return values[:, list(self.columns)]
 
-    def _turned(self, signals: Signals, values: Floats, times: Floats) -> Floats:
-        inputs = signals.inputs
+    def _turned(self, inputs: Inputs, values: Floats, rows: Ints) -> Floats:
+        if not (self.in_sensor_frame or self.in_tool_frame):
+            return values
         rotation = inputs.sensor_rotation if self.in_sensor_frame else inputs.tool_rotation
-        row = nearest_rows(inputs.time_s, times)
-        turned: Floats = np.einsum("nji,nj->ni", rotation[row], values)
+        turned: Floats = np.einsum("nji,nj->ni", rotation[rows], values)
         return turned

@@ -16,7 +16,7 @@ from gcode2krl.gap.fit.moments import strongest_moments
 from gcode2krl.gap.fit.signatures import Block, blocks_at, blocks_from, blocks_of, strongest_hz
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_MOTION = frozenset({Dependence.VELOCITY, Dependence.ACCELERATION, Dependence.TONE})
+_MOTION = frozenset({Dependence.VELOCITY, Dependence.ACCELERATION, Dependence.JERK, Dependence.TONE})
 """What poses do not have."""
 
 

@@ -58,6 +58,12 @@ class LinkData:
         likelihood = likelihood.counting(once)
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
 
+    def settled(self) -> "LinkData":
+        """Return the data without the columns of candidates, which only a selection needs."""
+        self.known.forget()
+        candidates = replace(self.candidates, signatures=())
+        return replace(self, candidates=candidates, signatures=SignatureGram.none())
+
     @property
     def values(self) -> int:
         """Return the number of values."""
@@ -132,6 +138,11 @@ class Examination:
     def causes(self) -> tuple[Applied, ...]:
         """Return the accepted effects that are more than normal mismatch."""
         return tuple(self.applied[number] for number in self.cause_numbers)
+
+    @property
+    def cost(self) -> float:
+        """Return chi2 and the cost of the numbers."""
+        return self.fitted.chi2 + self.fitted.occam
 
     @property
     def mismatch(self) -> tuple[Applied, ...]:

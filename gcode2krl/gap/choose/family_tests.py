@@ -57,6 +57,9 @@ class FamilyTests:
     """The best other family with the cause taken out."""
     components: frozenset[int]
     """Of the signal, which the cause moves."""
+    family_behind: float | None = None
+    """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
+    None where its family says nothing."""
 
     def is_near(self, evidence: Evidence) -> bool:
         """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
@@ -91,10 +94,10 @@ class Rest:
     study: Study
     gap_gain: float
     """Fall of chi2 by all that is known to explain the gap: the power of the gap beyond noise."""
-    blocks: int
-    """Number of whitened values."""
     is_sized: bool = False
     """Its size alone is significant: then families need not prove that there is a rest."""
+    upstream_gain: float = 0.0
+    """Power beyond noise of what earlier links have shown of the joints, and the model has of them."""
 
     def share(self, evidence: Evidence) -> float:
         """Return the share of the gap's power that a family takes; 0 where it is not significant."""
@@ -104,10 +107,15 @@ class Rest:
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
         best = max(self.study.evidences, key=net_gain, default=None)
-        if best is None or self.study.p > _LIMITS.gap_p:
+        # of all that is known the form is known to a hundredth of its size, however long one looks at it
+        if best is None or net_gain(best) < _LIMITS.form_error**2 * (self.gap_gain + self.upstream_gain):
             return False
-        certain = best.nats / best.inflation >= _LIMITS.gap_evidence
-        return certain and net_gain(best) >= _LIMITS.gap_power * self.blocks
+        is_rare = self.study.tail_p <= _LIMITS.gap_p
+        if is_rare and best.nats / best.inflation >= _LIMITS.gap_evidence:
+            return True
+        # few strong stretches have few signs to flip; beyond all that models are off by, none are needed
+        most = max(each.nats / each.inflation for each in self.study.evidences)
+        return most >= _LIMITS.certain_evidence
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
@@ -117,7 +125,7 @@ class Rest:
         return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 
 
-NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0, 0)
+NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0)
 """The rest of a link that families are not asked about."""
 
 
@@ -136,7 +144,11 @@ class LinkFamilies:
         outs = [self._without((number,)) for number in numbers]
         everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
         self._bare = self._without(numbers)
-        self.rest = Rest(everything, self._gap_gain(everything.evidences, None), len(self._rows))
+        self.rest = Rest(
+            everything,
+            self._gap_gain(everything.evidences, None),
+            upstream_gain=_upstream_gain(likelihood),
+        )
         """Beside all accepted effects."""
         self.tests = tuple(
             self._tests(number, out, study)
@@ -205,6 +217,7 @@ class LinkFamilies:
             other_power=0.0 if other is None else self._power_share(other, number),
             other_p=1.0 if other is None else rest.p_of(other),
             family=own[0] if own else None,
+            family_behind=(form_nats - own[0].nats) / own[0].inflation if own else None,
             better=better,
             components=components,
         )
@@ -234,6 +247,15 @@ class LinkFamilies:
         tangents = self._whole.tangents[:, self._found.fitted.numbers.slices[number]]
         information = tangents.T @ out.without_fixed(tangents)
         return float(np.linalg.slogdet(np.eye(len(information)) + _PRIOR**2 * information)[1])
+
+
+def _upstream_gain(likelihood: Likelihood) -> float:
+    """Return the power beyond noise of what the measured joints move the model by."""
+    moved = []
+    for trace in likelihood.traces:
+        inputs = replace(trace.inputs, q_act_rad=None, q_load_rad=None)
+        moved.append(trace.nominal - replace(trace, inputs=inputs).nominal)
+    return float(np.sum(likelihood.whiten(moved) ** 2))
 
 
 def _is_in(components: frozenset[int], evidence: Evidence) -> bool:

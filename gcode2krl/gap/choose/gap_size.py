@@ -53,6 +53,13 @@ class Size:
     largest_after: float
     freedom: float = np.inf
     """Degrees of freedom of the deviation."""
+    calm_excess: float = 0.0
+    """The excess of rows that are no louder than usual: events and heavy tails are not of its test.
+
+    Nor is what is as quick as noise and more than the stated: a finding of the instrument.
+    """
+    moments_off: int = 0
+    """Rows in which a model without noise is off by more than its accuracy, after the effects."""
 
     @property
     def power(self) -> float:
@@ -62,8 +69,8 @@ class Size:
     @property
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
-        certain = _as_many_deviations(self.freedom) * self.deviation
-        return self.excess > max(certain, _LIMITS.significant_share * self.noise)
+        loud = self.calm_excess > _as_many_deviations(self.freedom) * self.deviation
+        return loud or self.moments_off >= _LIMITS.model_off_rows
 
     @property
     def share_left(self) -> float:
@@ -95,7 +102,9 @@ def pooled(sizes: Sequence[Size]) -> Size:
         deviation=mean([size.deviation for size in sizes]) / len(sizes) ** 0.5,
         largest_before=max(size.largest_before for size in sizes),
         largest_after=max(size.largest_after for size in sizes),
+        calm_excess=mean([size.calm_excess for size in sizes]),
         freedom=sum(size.freedom for size in sizes),
+        moments_off=sum(size.moments_off for size in sizes),
     )
 
 
@@ -126,8 +135,24 @@ def size_of_gap(
         deviation=deviation,
         largest_before=_largest(before),
         largest_after=_largest(after),
+        calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
+        moments_off=moments_off(traces, structured, [*usual, *applied]),
     )
+
+
+def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequence[Applied]) -> int:
+    """Return in how many rows a rest (n, k) is beyond the accuracy of a model; 0 where noise is the limit.
+
+    A mean over the run does not see what is off at its corners alone.
+    """
+    if traces[0].link.model_rms == 0.0:
+        return 0
+    beyond = (
+        np.abs(rest) > _LIMITS.model_off * trace.model_error(applied)
+        for trace, rest in zip(traces, left, strict=True)
+    )
+    return sum(int(np.count_nonzero(rows.any(axis=1))) for rows in beyond)
 
 
 def _less(values: Sequence[Floats], others: Sequence[Floats]) -> list[Floats]:
@@ -142,6 +167,16 @@ def _squares(values: Floats) -> Floats:
 
 def _mean_square(values: Sequence[Floats]) -> float:
     return float(np.mean(np.concatenate([_squares(each) for each in values])))
+
+
+def _calm_mean_square(traces: Sequence[Trace], values: Sequence[Floats], noise: Sequence[Noise]) -> float:
+    """Return the mean square of values (n, k), of each component over its calm rows."""
+    power = 0.0
+    for j, own in enumerate(noise):
+        columns = [each[:, j] for each in values]
+        calm = [own.calm_rows(x, trace.segments) for x, trace in zip(columns, traces, strict=True)]
+        power += float(np.mean(np.concatenate([x[rows] for x, rows in zip(columns, calm, strict=True)]) ** 2))
+    return power
 
 
 def _largest(values: Sequence[Floats]) -> float:

@@ -5,6 +5,7 @@ from typing import Self
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
+from gcode2krl.gap.beside.events import Event, Whose
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.calibrated import probabilities_table
@@ -108,6 +109,16 @@ class Judgement(Judged):
     """The traces with the held-out ones."""
     rest: Rest | None = None
     """On what depends what is left beside the named causes; None where it was not asked."""
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Return the events of all runs, in the order of the runs."""
+        return tuple(event for trace in self.every or self.traces for event in trace.events)
+
+    @property
+    def impulses(self) -> tuple[Event, ...]:
+        """Return the events that are a gap by themselves: something hit or was hit."""
+        return tuple(event for event in self.events if event.whose is Whose.IMPULSE)
 
     def fitted(self, trace: Trace, stamps_s: Floats) -> Floats:
         """Return what the fitted model says of a trace's run at some stamps (n,), as (n, k).

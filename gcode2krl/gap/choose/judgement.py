@@ -1,6 +1,6 @@
 """One link, from its traces to a judgement: causes, their probability, and what held-out data say of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,14 +11,14 @@ from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.calibrated import probabilities_table
 from gcode2krl.gap.choose.constancy import constancy_of
-from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.choose.examination import Examination, Key
 from gcode2krl.gap.choose.family_tests import NOTHING_LEFT, LinkFamilies, Rest
 from gcode2krl.gap.choose.features import HeldOut, features_of
 from gcode2krl.gap.choose.gap_size import Size, pooled, size_of_gap
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.judged import NAMED, Cause, Judgement
-from gcode2krl.gap.choose.rivals import rival_probabilities, rivals_of
-from gcode2krl.gap.choose.selection import examine
+from gcode2krl.gap.choose.rivals import Rival, rival_probabilities, rivals_of
+from gcode2krl.gap.choose.selection import examine, with_rival
 from gcode2krl.gap.choose.set_clocks import with_set_clocks
 from gcode2krl.gap.choose.wander import is_wander
 from gcode2krl.gap.fit.design import Question, nuisance_for
@@ -32,25 +32,62 @@ _LEAST_REST = 1e-6
 
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     """Examine a link on some traces and report on the held-out ones; without any, each held out in turn."""
+    judged = _judged(link, traces, held, question)
+    found = judged.examination
+    return replace(judged, examination=replace(found, data=found.data.settled()))
+
+
+def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     known = Signatures()
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
-    found = examine(link, traces, question, known)
+    found, rivals, swaps = _settled(examine(link, traces, question, known))
     every = (*traces, *held)
     if not found.causes:
-        return _without_causes(found, every)
+        return _with_impulses(_without_causes(found, every))
     families = LinkFamilies(found, every)
-    trials = list(_trials(found, held))
+    trials = list(_trials(found, held, swaps))
     counts = range(len(found.causes) + 1)
     if trials:
         sizes = [pooled([trial.size(count) for trial in trials]) for count in counts]
     else:
         sizes = [_size(found, traces, found.causes[:count]) for count in counts]
     whole = _size(found, traces, found.causes)
-    judged = _judgement(found, sizes, whole, families, trials)
+    judged = _judgement(found, sizes, whole, families, trials, rivals)
     with_named = _size_with_named(judged, sizes, trials)
     judged = replace(judged, every=every, size_with_named=with_named)
-    return judged if judged.verdict != "explained" else _beside_its_rest(judged, whole)
+    return _with_impulses(judged if judged.verdict != "explained" else _beside_its_rest(judged, whole))
+
+
+def _settled(found: Examination) -> tuple[Examination, dict[int, list[Rival]], dict[Key, Applied]]:
+    """Return the examination in which no rival of a cause is better than it, with the rivals and the swaps.
+
+    The rivals of each cause by its number; what was put in place of the effects that were accepted first.
+    """
+    swaps: dict[Key, Applied] = {}
+    while True:
+        rivals = {number: rivals_of(found, number) for number in found.cause_numbers}
+        better = [(each[0], number) for number, each in rivals.items() if each and each[0].is_better]
+        if not better or len(swaps) >= len(found.causes):
+            return found, rivals, swaps
+        best, number = min(better, key=lambda pair: pair[0].cost_difference)
+        swapped = with_rival(found, number, best.applied)
+        if swapped is None or swapped.cost >= found.cost:
+            return found, rivals, swaps
+        swaps[_key(found.applied[number])] = best.applied
+        found = swapped
+
+
+def _key(applied: Applied) -> Key:
+    return applied.effect.name, applied.target
+
+
+def _with_impulses(judged: Judgement) -> Judgement:
+    """Return the judgement: an impulse of the machine is a gap whose rows no other test has."""
+    if judged.impulses and judged.verdict in ("no_gap", "explained"):
+        verdict = "unexplained" if judged.verdict == "no_gap" else "partly_explained"
+        return replace(judged, verdict=verdict, nearly_all=judged.verdict == "explained")
+    return judged
 
 
 def _beside_its_rest(judged: Judgement, whole: Size) -> Judgement:
@@ -146,8 +183,11 @@ class _Trial:
         return _size(self.chosen, self.held, causes)
 
 
-def _trials(found: Examination, held: Sequence[Trace]) -> Iterator[_Trial]:
-    """Yield one trial a split: what was chosen without the held-out data, and these."""
+def _trials(found: Examination, held: Sequence[Trace], swaps: Mapping[Key, Applied]) -> Iterator[_Trial]:
+    """Yield one trial a split: what was chosen without the held-out data, and these.
+
+    ``swaps``: better rivals of what is accepted first, which take their place in each split too.
+    """
     if held:
         yield _Trial(found, held, found)
         return
@@ -156,6 +196,9 @@ def _trials(found: Examination, held: Sequence[Trace]) -> Iterator[_Trial]:
     ]  # of what the causes do in each row
     for train, test in folds_of(found.traces, power):
         chosen = examine(found.link, train, found.question, found.data.known, found.noise)
+        for key, rival in swaps.items():
+            number = next((i for i, each in enumerate(chosen.applied) if _key(each) == key), None)
+            chosen = (None if number is None else with_rival(chosen, number, rival)) or chosen
         yield _Trial(chosen, test, found)
 
 
@@ -168,6 +211,7 @@ def _judgement(
     whole: Size,
     families: LinkFamilies,
     trials: Sequence[_Trial],
+    rivals: Mapping[int, Sequence[Rival]],
 ) -> Judgement:
     """Return the judgement from the sizes of the gap with the first 0, 1, 2 … causes.
 
@@ -177,7 +221,8 @@ def _judgement(
     # what is left on held-out data alone is what few runs do not settle of a cause's numbers
     left = last.significant and whole.significant
     every = replace(families.rest, is_sized=left)
-    causes = sorted(_causes(found, sizes, families, every, trials), key=lambda cause: -cause.probability)
+    told = _causes(found, sizes, families, every, trials, rivals)
+    causes = sorted(told, key=lambda cause: -cause.probability)
     named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = left if named else sizes[0].significant
     rest = replace(families.beside(named), is_sized=is_sized)
@@ -209,11 +254,12 @@ def _causes(
     families: LinkFamilies,
     every: Rest,
     trials: Sequence[_Trial],
+    compared: Mapping[int, Sequence[Rival]],
 ) -> Iterator[Cause]:
     """Yield the causes in the order in which they were accepted; ``every`` is what all of them leave."""
     intervals = intervals_of(found)
     for order, number in enumerate(found.cause_numbers):
-        tests, constant, rivals = families.tests[order], constancy_of(found, number), rivals_of(found, number)
+        tests, constant, rivals = families.tests[order], constancy_of(found, number), compared[number]
         features = features_of(
             found,
             number,

@@ -1,6 +1,6 @@
 """How probable it is that a rest depends on each family: of one signal one family is the right one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,20 @@ def family_probabilities(rest: Rest, larger_links: int = 0) -> list[FamilyProbab
     ``larger_links`` have a larger gap that has no name.
     """
     components = {each.place.component for each in rest.study.evidences}
-    found = [each for component in components for each in _of_signal(rest, component, larger_links)]
-    return sorted(found, key=lambda each: -each.probability)
+    found = {component: _of_signal(rest, component, larger_links) for component in components}
+    whole = found.get(None)
+    every = [each for own in found.values() for each in own]
+    if whole is not None:
+        # what moves all components together is not told of each of them once more
+        every = [_beside(each, whole[0]) for each in every]
+    return sorted(every, key=lambda each: -each.probability)
+
+
+def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbability:
+    """Return a family of one component beside that of all, which is it where it has more evidence."""
+    if told.evidence.place.component is None or told.evidence.nats > whole.evidence.nats:
+        return told
+    return replace(told, probability=min(told.probability, 1.0 - whole.probability))
 
 
 def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:

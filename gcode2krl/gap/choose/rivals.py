@@ -1,6 +1,7 @@
 """Other effects in place of a cause: how much worse each is, and which the data cannot tell from it."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,14 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.choose.examination import Examination, Key
 from gcode2krl.gap.choose.probability_table import declared_nats
 from gcode2krl.gap.choose.scoring import Score, scores
+from gcode2krl.gap.choose.twins import twins_of
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.sensitivity import sensitivity_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
+_SETTLED = 0.1
+"""Of chi2: fits end where less is to be had."""
 _STEPS = 6
 """Half of a whole refit: a rival begins at its best linear fit."""
 
@@ -26,6 +30,13 @@ class Rival:
     cost_difference: float
     """By how much chi2 and the cost of the numbers are higher than with the cause."""
     chi2_difference: float
+    distance2: float = np.inf
+    """Square of the distance between both refitted signals, over the power of what the cause does."""
+
+    @property
+    def is_better(self) -> bool:
+        """Tell whether the rival has more evidence than the cause."""
+        return self.cost_difference < -_SETTLED
 
     @property
     def behind_nats(self) -> float:
@@ -34,8 +45,11 @@ class Rival:
 
     @property
     def alike(self) -> bool:
-        """Tell whether the data cannot tell the rival from the cause: it belongs to the declared set."""
-        return self.behind_nats < declared_nats()
+        """Tell whether the data cannot tell the rival from the cause: it belongs to the declared set.
+
+        Nor can they where the signals of both differ by less than models are exact to.
+        """
+        return self.behind_nats < declared_nats() or self.distance2 < _LIMITS.model_error**2
 
 
 def rivals_of(found: Examination, number: int) -> list[Rival]:
@@ -43,23 +57,42 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
     others = found.without(number)
     spread = sensitivity_of(found.likelihood, found.fitted, number).inflation()
     gain = found.likelihood.chi2(others) - found.fitted.chi2
+    residual = found.likelihood.residual(found.applied)
     rivals: dict[Key, Rival] = {}
-    for score in _ranked(found, number):
-        block = found.data.candidates.block(score.column)
-        if block.key in rivals or len(rivals) >= _LIMITS.most_rivals:
+    for start in itertools.chain(_of_twins(found, number), _of_gain(found, number, gain, spread)):
+        if _key(start) in rivals or len(rivals) >= _LIMITS.most_rivals:
             continue
-        bent = not block.effect.is_linear
-        share = _LIMITS.bent_rival_share if bent else _LIMITS.rival_share
-        if score.gain < gain - max(share * gain, _LIMITS.rival_gain * spread):
-            continue
-        start = block.applied(score.coefficients, found.traces[0])
+        bent = not start.effect.is_linear
         fitted = refit(found.likelihood, (*others, start), steps=_STEPS, scan=bent)
-        if fitted.at_bound[-1]:
+        if fitted.at_bound[-1] or not np.isfinite(fitted.chi2):
             continue
         difference = (fitted.chi2 - found.fitted.chi2) / spread
         cost = difference + fitted.occam - found.fitted.occam
-        rivals[block.key] = Rival(fitted.applied[-1], float(cost), float(difference))
+        apart = found.likelihood.residual(fitted.applied) - residual
+        distance2 = float(apart @ apart) / max(gain, 1e-300)
+        rivals[_key(start)] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
+
+
+def _key(applied: Applied) -> Key:
+    return applied.effect.name, applied.target
+
+
+def _of_gain(found: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
+    """Yield other effects whose linear gain comes near that of a cause."""
+    for score in _ranked(found, number):
+        block = found.data.candidates.block(score.column)
+        share = _LIMITS.rival_share if block.effect.is_linear else _LIMITS.bent_rival_share
+        if score.gain >= gain - max(share * gain, _LIMITS.rival_gain * spread):
+            yield block.applied(score.coefficients, found.traces[0])
+
+
+def _of_twins(found: Examination, number: int) -> Iterator[Applied]:
+    """Yield other effects that do what a cause does while it is small."""
+    cause = found.applied[number]
+    if not cause.effect.plans_anew:
+        twins = twins_of(found, cause, found.without(number), found.accepted_keys)
+        yield from (twin.start for twin in twins)
 
 
 def _ranked(found: Examination, number: int) -> list[Score]:

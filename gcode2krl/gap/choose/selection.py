@@ -9,11 +9,13 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination, LinkData
+from gcode2krl.gap.choose.gap_size import fitted_mismatch, moments_off
 from gcode2krl.gap.choose.mismatch import within_mismatch
 from gcode2krl.gap.choose.ranking import ranked, shortlist
 from gcode2krl.gap.choose.replanning import replanned
 from gcode2krl.gap.choose.scoring import Score, surprise, threshold, tried
 from gcode2krl.gap.choose.shown_numbers import with_shown_numbers
+from gcode2krl.gap.choose.twins import twins_of
 from gcode2krl.gap.fit.design import Candidates, Question, nuisance_for
 from gcode2krl.gap.fit.fitted import Fitted
 from gcode2krl.gap.fit.noise import Noise
@@ -51,6 +53,19 @@ def examine(
     return found
 
 
+def with_rival(found: Examination, number: int, rival: Applied) -> Examination | None:
+    """Return the examination with a rival in place of an accepted effect; None where it fails a test."""
+    others = refit(found.likelihood, found.without(number), steps=_PRUNING_STEPS)
+    before = found.dropping(number, others)
+    key, candidates = (rival.effect.name, rival.target), found.data.candidates
+    column = next((each for each in candidates.columns if candidates.block(each).key == key), None)
+    if column is None:
+        return None
+    fitted = refit(found.likelihood, (*others.applied, rival))
+    surprising = _tested(before, _Trial(column.width, candidates.block(column), fitted))
+    return None if surprising is None else _with(before, fitted, surprising)
+
+
 def _power(noise: Sequence[Noise]) -> float:
     return sum(each.sigma**2 for each in noise)
 
@@ -66,10 +81,21 @@ def _selected(data: LinkData) -> Examination:
 
 
 def _may_grow(found: Examination) -> bool:
-    # what is left of a link that is met to the accuracy of its model is no noise that averages out
-    sound = found.link.model_rms > 0.0 and found.fitted.chi2 < found.data.values
     room = len(found.causes) < _LIMITS.most_causes and len(found.applied) < _LIMITS.most_effects
-    return room and not sound
+    return room and not _is_met(found)
+
+
+def _is_met(found: Examination) -> bool:
+    """Tell whether a link is met to the accuracy of its model: what is left is no noise that averages out.
+
+    In the mean, and at all moments: corners are a hundredth of a run.
+    """
+    if found.link.model_rms == 0.0 or found.fitted.chi2 >= found.data.values:
+        return False
+    left = [trace.measured - trace.sample(found.applied) for trace in found.traces]
+    own, shared = fitted_mismatch(found.likelihood, left)
+    rest = [r - a - b for r, a, b in zip(left, own, shared, strict=True)]
+    return moments_off(found.traces, rest, found.applied) < _LIMITS.model_off_rows
 
 
 def _grown(found: Examination) -> tuple[Examination, bool]:
@@ -91,8 +117,9 @@ def _grown(found: Examination) -> tuple[Examination, bool]:
 def _accepted(found: Examination, scores: Sequence[Score], values: int) -> tuple[Examination, bool]:
     """Return the examination with the best refit that passes the tests, and whether one does."""
     while scores:
-        trials = sorted(_trials(found, shortlist(found, scores, values)), key=lambda trial: trial.cost)
-        for trial in trials:
+        trials = list(_trials(found, shortlist(found, scores, values)))
+        trials += _of_twins(found, trials)
+        for trial in sorted(trials, key=lambda trial: trial.cost):
             surprising = _tested(found, trial)
             if surprising is not None:
                 return _with(found, trial.fitted, surprising), True
@@ -119,7 +146,8 @@ def _with(found: Examination, fitted: Fitted, surprising: float) -> Examination:
 class _Trial:
     """A candidate and its refit beside the accepted effects."""
 
-    score: Score
+    width: int
+    """Number of its columns."""
     block: Block
     fitted: Fitted
 
@@ -140,7 +168,18 @@ def _trials(found: Examination, scores: Sequence[Score]) -> Iterator[_Trial]:
         else:
             fitted = with_shown_numbers(found, _refitted(found, start, best))
         best = min(best, fitted.chi2)
-        yield _Trial(score, block, fitted)
+        yield _Trial(score.column.width, block, fitted)
+
+
+def _of_twins(found: Examination, trials: Sequence[_Trial]) -> Iterator[_Trial]:
+    """Yield the refits of candidates that do what the best trial does while it is small."""
+    best = min(trials, key=lambda trial: trial.cost)
+    if best.block.effect.plans_anew or not np.isfinite(best.cost):
+        return
+    tried = {*(trial.block.key for trial in trials), *found.accepted_keys, *found.rejected}
+    for twin in twins_of(found, best.fitted.applied[-1], found.applied, tried):
+        fitted = with_shown_numbers(found, _refitted(found, twin.start, best.fitted.chi2))
+        yield _Trial(twin.column.width, found.data.candidates.block(twin.column), fitted)
 
 
 def _refitted(found: Examination, start: Applied, best: float) -> Fitted:
@@ -176,7 +215,7 @@ def _tested(found: Examination, trial: _Trial) -> float | None:
         return None
     sensitivity = sensitivity_of(found.likelihood, fitted, len(fitted.applied) - 1)
     # shapes are searched too, so that chi2 has a degree for each of them
-    surprising = surprise(gain / sensitivity.inflation(), max(trial.score.column.width, len(last.names)))
+    surprising = surprise(gain / sensitivity.inflation(), max(trial.width, len(last.names)))
     if surprising < found.level:
         return None
     if trial.block.effect.plans_anew:

@@ -18,6 +18,8 @@ from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.choose.foretold import Foretold, foretold_of
+from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.fit.fitted import Numbers
 from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.likelihood import STEP_SHARE, Likelihood
@@ -49,6 +51,8 @@ class Apart:
     signal: str
     noise: float
     """Standard deviation of a value, in the report's unit."""
+    is_open: tuple[bool, bool] = (False, False)
+    """Of the first and the second: the measured runs do not say which way it goes."""
 
 
 class Bench:
@@ -66,53 +70,65 @@ class Bench:
         """Return what effects change in the signal (n, k)."""
         return self.trace.sample(applied) - self.trace.nominal if applied else np.zeros(self.trace.shape)
 
+    def foretold(self, applied: Applied | None, information: Floats | None = None) -> Foretold:
+        """Return what an effect shows in the program; None is one that does nothing there.
+
+        ``information`` (p, p): that of the measured runs on its numbers, in typical sizes; without it they
+        are free.
+        """
+        mean = self.shown(() if applied is None else (applied,))
+        numbers = None if applied is None else Numbers.of((applied,), self.trace)
+        x = np.zeros(0) if numbers is None or applied is None else numbers.start((applied,))
+        if numbers is None or not len(x):
+            return Foretold(mean, np.zeros((mean.shape[1], mean.shape[0], 0)), np.zeros((0, 0)))
+        columns = self.likelihood.tangents(numbers, x)[0]
+        return Foretold(mean, columns, np.zeros((len(x), len(x))) if information is None else information)
+
+    def of_family(self, evidence: Evidence, traces: Sequence[Trace]) -> Foretold | None:
+        """Return what a family shows in the program, as the measured traces know it."""
+        return foretold_of(evidence, traces, self.trace, [each.sigma for each in self.found.noise])
+
     def apart(
         self, first: Applied | None, second: Applied | None, information: Floats | None = None
     ) -> Apart:
-        """Return what sets two answers apart; None is one that does nothing in the program.
+        """Return what sets two effects apart, the second one refitted as far as ``information`` lets it."""
+        return self.between(self.foretold(first), self.foretold(second, information))
 
-        ``information`` (p, p): that of the measured runs on the second answer's numbers, in typical sizes;
-        without it they are free.
-        """
-        one = self.shown(() if first is None else (first,))
-        other = self.shown(() if second is None else (second,))
-        moved = other
-        if second is not None:
-            moved = other + self._refitted(one - other, second, information)
-        rest = self.likelihood.marginal(self.likelihood.whiten([one - moved]))
-        return self._farthest(float(rest @ rest), one, other)
+    def between(self, first: Foretold, second: Foretold) -> Apart:
+        """Return what sets two answers apart, the second one moved towards the first as far as it may be."""
+        missing = first.mean - second.mean
+        left = missing - self._moved(missing, second)
+        rest = self.likelihood.marginal(self.likelihood.whiten([left]))
+        return self._farthest(float(rest @ rest), first, second)
 
-    def _refitted(self, missing: Floats, second: Applied, information: Floats | None) -> Floats:
+    def _moved(self, missing: Floats, second: Foretold) -> Floats:
         """Return by how much the second answer moves towards what is missing (n, k), to first order."""
-        numbers = Numbers.of((second,), self.trace)
-        x = numbers.start((second,))
-        if not len(x):
+        width = second.columns.shape[2]
+        if not width:
             return np.zeros_like(missing)
-        tangents = self.likelihood.tangents(numbers, x)[0]  # (k, n, p)
         columns = np.stack(
             [
-                self.likelihood.projected(self.likelihood.whiten([tangents[:, :, p].T])[:, None])[:, 0]
-                for p in range(tangents.shape[2])
+                self.likelihood.projected(self.likelihood.whiten([second.columns[:, :, p].T])[:, None])[:, 0]
+                for p in range(width)
             ],
             axis=1,
         )
         wanted = self.likelihood.projected(self.likelihood.whiten([missing])[:, None])[:, 0]
-        known = np.zeros((len(x), len(x))) if information is None else information
-        normal = columns.T @ columns + known + _FREE * np.eye(len(x))
+        normal = columns.T @ columns + second.information + _FREE * np.eye(width)
         step = np.linalg.solve(normal, columns.T @ wanted)
-        moved: Floats = np.einsum("knp,p->nk", tangents, step)
+        moved: Floats = np.einsum("knp,p->nk", second.columns, step)
         return moved
 
-    def _farthest(self, distance2: float, first: Floats, second: Floats) -> Apart:
+    def _farthest(self, distance2: float, first: Foretold, second: Foretold) -> Apart:
         """Return the distance, and what both answers show where they differ most."""
         sigma = np.array([each.sigma for each in self._noise])
-        off = (first - second) / sigma
+        off = (first.mean - second.mean) / sigma
         changed = off - off[0]
         # an instrument's zero may be anything: a change is told where the answers differ by one
         is_change = bool(np.abs(changed).max() >= _LIMITS.told_change * np.abs(off).max())
         which = np.abs(changed if is_change else off)
         row, column = (int(at) for at in np.unravel_index(int(np.argmax(which)), which.shape))
-        values = [each[row, column] - is_change * each[0, column] for each in (first, second)]
+        values = [each.value(row, column, is_change) for each in (first, second)]
         factor = self.trace.factor
         return Apart(
             distance2=distance2,
@@ -124,6 +140,7 @@ class Bench:
             unit=self.trace.unit,
             signal=self.trace.signal,
             noise=factor * float(sigma[column]),
+            is_open=(first.is_open, second.is_open),
         )
 
 

@@ -24,5 +24,7 @@ the mean of the evidences over all positions pays for the search.
 
 **Null** (`study`). Scores u_g = Σ_{i in g} B_i·r_i over stretches of time g (one second). If nothing
 admissible explains the rest, their signs are arbitrary; the largest evidence over all families with signs
-drawn at random is what the largest one has to exceed.
+drawn at random is what the largest one has to exceed; for a gap by the Gumbel distribution of the flips.
+Few strong stretches have few signs: there the evidence alone must be beyond what models of sound machines
+are off by. What happens once, in a few rows, has a null of its own (`gcode2krl.gap.beside.events`).
 """

@@ -33,7 +33,10 @@ TIMING = "timing"
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a deviation is: its name, and the columns (k, n, d) of each trace that a unit of it makes."""
+    """Where a deviation is: its name, and the columns (k, n, d) of each trace that a unit of it makes.
+
+    Along each axis by itself d is 3, along one direction 1: of one name, for which the better one speaks.
+    """
 
     name: str
     where: Where
@@ -42,13 +45,18 @@ class Place:
     component: int | None = None
     """Where it is one component of the signal alone; ``units`` are then (1, n, d)."""
 
+    @property
+    def width(self) -> int:
+        """Return the number of axes along which a unit of it is: d."""
+        return int(self.units[0].shape[2])
+
     def lifted(self, functions: Functions) -> tuple[list[Floats], tuple[Floats, ...]]:
         """Return columns (k, n, f·d) of functions at this place, and the roots of their covariances."""
         columns: list[Floats] = [
             (own[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
             for own, unit in zip(functions.columns, self.units, strict=True)
         ]
-        directions = np.eye(self.units[0].shape[2])
+        directions = np.eye(self.width)
         roots = [np.asarray(np.kron(root, directions), dtype=np.float64) for root in functions.roots]
         return columns, tuple(roots)
 
@@ -61,6 +69,8 @@ class Family:
     on: Dependence
     columns: Sequence[Floats]
     roots: tuple[Floats, ...]
+    directions: int = 1
+    """So many columns next to each other are one function along the axes of the place."""
 
 
 class Grid:
@@ -81,8 +91,8 @@ class Grid:
         if trace.link.of_joints:
             return tuple(self._own_joints())
         if trace.link.of_tip:
-            return (self._axes("tip", Where.TIP), *self._arm_joints())
-        return (self._axes("force", Where.FORCE_AXIS),)
+            return (*self._in_space("tip", Where.TIP), *self._arm_joints())
+        return tuple(self._in_space("force", Where.FORCE_AXIS))
 
     @property
     def _timing(self) -> Place:
@@ -92,12 +102,26 @@ class Grid:
         units = [trace.rate.T[:, :, None] / max(scale, 1e-300) for trace in self.traces]
         return Place(TIMING, Where.JOINT, tuple(units))
 
-    def _axes(self, name: str, where: Where) -> Place:
-        units = []
-        for trace in self.traces:
-            n, k = trace.shape
-            units.append(np.repeat(np.diag(self._sigma)[:, None, :], n, axis=1).reshape(k, n, k))
-        return Place(name, where, tuple(units))
+    def _in_space(self, name: str, where: Where) -> Iterator[Place]:
+        """Yield a place along its axes, along the tool, and along gravity where the tool is not."""
+        yield Place(name, where, tuple(self._axes(trace) for trace in self.traces))
+        tool = self._along([own.tool_axes[:, :, 2] for own in self.inputs])
+        down = self._along([np.tile(t.inputs.gravity, (len(t.time_s), 1)) for t in self.traces])
+        yield Place(name, where, tool)
+        if not _is_alike(tool, down):
+            yield Place(name, where, down)
+
+    def _axes(self, trace: Trace) -> Floats:
+        n, k = trace.shape
+        return np.repeat(np.diag(self._sigma)[:, None, :], n, axis=1).reshape(k, n, k)
+
+    def _along(self, vectors: Sequence[Floats]) -> tuple[Floats, ...]:
+        """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``."""
+        sigma = float(np.mean(self._sigma))
+        return tuple(
+            sigma * own.as_stated(each)[:, list(own.trace.columns)].T[:, :, None]
+            for own, each in zip(self.inputs, vectors, strict=True)
+        )
 
     def _own_joints(self) -> Iterator[Place]:
         trace = self.traces[0]
@@ -119,9 +143,13 @@ class Grid:
         for place in self.places:
             for on, functions in self._functions(place):
                 if functions.width:
-                    yield Family(place, on, *place.lifted(functions))
-            if place.where is Where.TIP:
+                    yield Family(place, on, *place.lifted(functions), directions=place.width)
+            if place.width > 1 and place.where is Where.TIP:
                 yield from self._of_the_pose(place)
+            elif place.width > 1:
+                yield from self._of_the_signal(place)
+        if self.traces[0].link.tells_time:
+            yield from self._of_the_plan(self._timing)
 
     # Functions at a place
 
@@ -179,6 +207,8 @@ class Grid:
         if place.joint is not None:
             yield Dependence.VELOCITY, smooth([each.rate_rad_s[:, place.joint] for each in own])
             yield Dependence.ACCELERATION, smooth([each.acceleration_rad_s2[:, place.joint] for each in own])
+            if self.traces[0].link.of_joints:  # behind the arm's modes a jerk is no function any more
+                yield Dependence.JERK, free([each.jerk(place.joint) for each in own])
             return
         velocity = [each.velocity_mm_s for each in own]
         speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]
@@ -235,6 +265,51 @@ class Grid:
         middle = np.concatenate(axes).mean(axis=0)
         return [np.concatenate([p, a - middle], axis=1) for p, a in zip(position, axes, strict=True)]
 
+    def _of_the_signal(self, place: Place) -> Iterator[Family]:
+        """Yield what depends on how fast the signal itself changes, and on where it was before.
+
+        It is late by one time, which the data must find; it has a loop, each axis its own.
+        """
+        sigma = float(np.mean(self._sigma))
+        late = _scaled([each.late() for each in self.inputs], sigma)
+        yield Family(place, Dependence.VELOCITY, late, tuple(np.eye(late[0].shape[2])[:, :, None]))
+        loops = [each.with_memory for each in self.inputs]
+        wide = [
+            np.einsum("knc,kj->knjc", each, np.eye(len(each))).reshape(*each.shape[:2], -1) for each in loops
+        ]
+        used = np.concatenate(wide, axis=1).any(axis=(0, 1))
+        if used.any():
+            loops = _scaled([each[:, :, used] for each in wide], sigma)
+            yield Family(place, Dependence.FORCE, loops, (np.eye(loops[0].shape[2]),))
+
+    def _of_the_plan(self, place: Place) -> Iterator[Family]:
+        """Yield what a controller makes of corners, speeds and stops by laws of its own."""
+        own, at = self.inputs, list(self.traces[0].columns)
+        sigma = float(np.mean(self._sigma))
+        late, _ = place.lifted(free([each.late_by_rounding for each in own]))
+        beside = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in own]
+        yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(beside, sigma)]))
+        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in own])))
+        yield Family(place, Dependence.STOPS, *place.lifted(free(self._passed)))
+
+    @property
+    def _passed(self) -> list[Floats]:
+        """(n, c) of each trace: 1 from each blended corner on, of one program the same in all runs."""
+        programs: dict[bytes, int] = {}
+        numbers: list[int] = []
+        widths: list[int] = []
+        for each in self.inputs:
+            targets = each.trace.inputs.targets
+            key = b"" if targets is None else targets.position_mm.tobytes()
+            numbers.append(programs.setdefault(key, len(programs)))
+            if len(programs) > len(widths):
+                widths.append(each.corners_passed.shape[1])
+        firsts = np.cumsum([0, *widths])
+        columns = [np.zeros((len(each.corners_passed), firsts[-1])) for each in self.inputs]
+        for number, wide, each in zip(numbers, columns, self.inputs, strict=True):
+            wide[:, firsts[number] : firsts[number + 1]] = each.corners_passed
+        return columns
+
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""
         columns, _ = place.lifted(self._of_position)
@@ -254,6 +329,13 @@ class Grid:
             )
             lifted, _ = place.lifted(free(force))
             yield Family(place, Dependence.FORCE_BY_PLACE, *_joined([lifted, _scaled(bends, sigma)]))
+
+
+def _is_alike(first: Sequence[Floats], second: Sequence[Floats]) -> bool:
+    """Tell whether units (k, n, 1) of each trace are along one line, to a tenth of their length."""
+    one, other = (np.concatenate(each, axis=1)[:, :, 0] for each in (first, second))
+    whole = np.sum(one**2) * np.sum(other**2)
+    return bool(np.sum(one * other) ** 2 > 0.99 * whole)
 
 
 def _scaled(columns: Sequence[Floats], size: float) -> list[Floats]:

@@ -1,7 +1,7 @@
 """Families that contain others: a smooth function can be a constant, what each run does over time anything.
 
 The larger one is ahead where the least rest follows it. It is told before the smaller one only where its
-evidence is larger by a share worth naming.
+evidence is larger by a share worth naming; what each run does over time is the last resort.
 """
 
 from collections.abc import Iterable, Mapping
@@ -46,11 +46,17 @@ def simplest_first(evidences: Iterable[Evidence]) -> tuple[Evidence, ...]:
         moved = False
         for i, larger in enumerate(told):
             j = next((j for j in range(i + 1, len(told)) if _is_within(told[j], larger)), None)
-            if j is None or larger.nats - told[j].nats >= THRESHOLDS.families.ahead_share * larger.nats:
+            if j is None or larger.nats - told[j].nats >= _ahead_share(larger) * larger.nats:
                 continue
             told[i], told[j] = replace(told[j], nats=larger.nats), replace(larger, nats=told[j].nats)
             moved = True
     return tuple(told)
+
+
+def _ahead_share(larger: Evidence) -> float:
+    """Return the share of its evidence from which on a larger family is ahead of one within it."""
+    is_time = larger.on is Dependence.RUN_TIME
+    return THRESHOLDS.families.time_ahead_share if is_time else THRESHOLDS.families.ahead_share
 
 
 def _is_within(smaller: Evidence, larger: Evidence) -> bool:

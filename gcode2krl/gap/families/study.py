@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.families.columns import Columns
+from gcode2krl.gap.families.directions import along_one
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.nested import simplest_first
@@ -28,6 +29,11 @@ class Study:
     evidences: tuple[Evidence, ...]
     p: float
     """Of an evidence as large as the largest, if nothing admissible explains what is left."""
+    tail_p: float = 1.0
+    """The same by the distribution of the largest (Gumbel 1935) that has the mean and deviation of the flips.
+
+    That goes on where so many flips end.
+    """
 
     def p_of(self, evidence: Evidence) -> float:
         """Return the same of one of its evidences."""
@@ -43,7 +49,8 @@ def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> lis
         columns = Columns(rows.of(family.columns, place.component))
         for view, own, sign in zip(views, found, signs, strict=True):
             at = view.at(place.component)
-            _add(own, [evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)])
+            every = evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)
+            _add(own, [every, along_one(at, every, family, columns, sign)])
     for place in grid.places:
         for own, evidences in zip(found, _searched(rows, views, place, signs), strict=True):
             _add(own, evidences)
@@ -84,10 +91,24 @@ def _study(view: View, found: Sequence[Evidence]) -> Study:
         best.setdefault(each.key, each)
     if not found:
         return Study(view.chi2, (), 1.0)
-    return Study(view.chi2, simplest_first(best.values()), _p(found, max(each.unbounded for each in found)))
+    nats = max(each.unbounded for each in found)
+    return Study(view.chi2, simplest_first(best.values()), _p(found, nats), _tail_p(_largest(found), nats))
+
+
+def _largest(found: Sequence[Evidence]) -> Floats:
+    """Return the largest evidence (flips,) over all families for random signs of stretches."""
+    largest: Floats = np.max(np.stack([each.flipped for each in found]), axis=0)
+    return largest
 
 
 def _p(found: Sequence[Evidence], nats: float) -> float:
     """Return p of an evidence, from the largest over all families for random signs of stretches."""
-    random = np.max(np.stack([each.flipped for each in found]), axis=0)
+    random = _largest(found)
     return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))
+
+
+def _tail_p(random: Floats, nats: float) -> float:
+    """Return the probability of at least so much of a Gumbel distribution with the moments of values (n,)."""
+    scale = float(np.std(random)) * np.sqrt(6.0) / np.pi
+    middle = float(np.mean(random)) - np.euler_gamma * scale
+    return float(-np.expm1(-np.exp(-(nats - middle) / max(scale, 1e-12))))

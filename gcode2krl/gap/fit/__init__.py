@@ -23,8 +23,11 @@
   whose innovations over their deviations are white (`kalman`); it starts at each gap of the data in the
   stationary state and is exact from the first row on: L is the Cholesky factor of the covariance.
 
-**Where the noise is learnt** (`noise_source`). Rows in a burst of the instrument and outliers are left out
-before (`beside.bursts`), hum of the mains is taken off (`beside.hum`).
+**Where the noise is learnt** (`noise_source`). Rows of impulses, of an instrument's bursts and outliers are
+left out before (`beside.events`), hum of the mains is taken off (`beside.hum`). What nothing explains and is
+far from its level for a moment is bridged, and of all runs together only windows of 20 rows count whose
+whitened power is about that of the median window (`noise.calm_rows`): mean squares would make noise of one
+spike, and a median alone would take heavy tails for less than they are.
 
 - Short part: of each run what effects, mismatch and half-second means leave, less its tones (`lines`), by
   least squares on three lags; the slow part's share of the lags is taken off first. What this takes of the
@@ -34,7 +37,7 @@ before (`beside.bursts`), hum of the mains is taken off (`beside.hum`).
   of (`explaining`) explain what they explain better than slow noise would; the rest is slow noise, its
   variance by restricted likelihood, which allows for the numbers fitted (Patterson & Thompson 1971).
 - Repeats of one program: of both parts only what differs between the runs is noise.
-- `run.toml` states short noise, as data sheets do: u has 0.9 to 2.5 times as much, and v is at most twice u.
+- `run.toml` states short noise, as data sheets do: u has 0.9 to 1.4 times as much, and v is at most twice u.
   What wanders more slowly, each run in its own way, is told from a gap by `choose.wander`.
 
 What a slow part can hide: an effect that is no signature, no smooth function, no tone and no step, and as

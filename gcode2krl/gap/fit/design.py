@@ -144,7 +144,6 @@ class Candidates:
         """Return the blocks that do something in at least one trace and are possible in all."""
         kept: list[Block] = []
         columns: list[Column] = []
-        stacks: list[list[Floats]] = [[np.zeros((*trace.shape[::-1], 0))] for trace in traces]
         first = 0
         for block in blocks:
             signatures = [known.columns(block, trace) for trace in traces]
@@ -157,9 +156,7 @@ class Candidates:
             )
             kept.append(block)
             first += width
-            for stack, each in zip(stacks, signatures, strict=True):
-                stack.append(each)
-        stacked = tuple(np.concatenate(stack, axis=2) for stack in stacks)
+        stacked = tuple(known.stacked(kept, trace) for trace in traces)
         return cls(tuple(kept), tuple(columns), stacked)
 
     def block(self, column: Column) -> Block:

@@ -74,6 +74,9 @@ def _of_component(inputs: Admissible, component: int) -> Iterator[Floats]:
         yield inputs.jacobian[:, column]
         yield inputs.jacobian[:, column] * inputs.torque_Nm
         yield inputs.jacobian[:, column] * inputs.directions
+    else:
+        yield trace.rate[:, component]
+        yield inputs.with_memory[component]
 
 
 def _odd(values: Floats) -> Floats:

@@ -9,6 +9,7 @@ tangents of the accepted effects.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,23 +23,62 @@ _RANK = 1e-9
 """Eigenvalues below this share of the largest hold rounding errors only."""
 
 
+class UsedColumns(NamedTuple):
+    """Those of some whitened columns of one trace that are not zero in a component."""
+
+    values: Floats
+    """(n, u)"""
+    at: Ints
+    """(u,) where they stand among all."""
+
+    def beside(self, nuisance: "UsedColumns", signatures: int, places: Ints) -> "UsedColumns":
+        """Return signatures with the nuisance, whose places in b are all of (w,), behind all of them."""
+        behind = signatures + np.searchsorted(places, nuisance.at)
+        return UsedColumns(np.column_stack([self.values, nuisance.values]), np.r_[self.at, behind])
+
+
 class SignatureGram:
     """Gram matrices of whitened signatures and nuisance, a stretch of time at a time."""
 
     def __init__(
-        self, columns: Sequence[Floats], signatures: int, places: Sequence[Ints], stretches: Sequence[Ints]
+        self,
+        columns: Sequence[Sequence[UsedColumns]],
+        signatures: int,
+        places: Sequence[Ints],
+        stretches: Sequence[Ints],
     ) -> None:
-        """Take the whitened columns (k·n, s + w) of each trace.
+        """Take the whitened columns of each trace and component.
 
         The first ``signatures`` are signatures, the others nuisance that stands in b at ``places`` (w,);
-        ``stretches`` (k·n,) number each row's stretch of time.
+        ``stretches`` (n,) number each row's stretch of time.
         """
-        self.columns, self.signatures, self.places = columns, signatures, places
+        self.signatures, self.places = signatures, places
+        self._columns = columns
         self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
         self._fixed = [
-            [_inner(wide[rows]) for rows in members]
-            for wide, members in zip(columns, self._rows, strict=True)
+            [self._inner(number, rows) for rows in members] for number, members in enumerate(self._rows)
         ]
+
+    def _inner(self, number: int, rows: Ints) -> Floats:
+        """Return inner products (s + w, s + w) of some rows of a trace."""
+        width = self.signatures + len(self.places[number])
+        gram = np.zeros((width, width))
+        for used in self._columns[number]:
+            own = used.values[rows]
+            gram[np.ix_(used.at, used.at)] += own.T @ own  # of one array BLAS makes half of the products
+        return gram
+
+    def _cross(self, number: int, rows: Ints, new: Floats) -> Floats:
+        """Return inner products (1 + t, s + w) of some rows of a trace with other columns (k, n, 1 + t)."""
+        cross = np.zeros((new.shape[2], self.signatures + len(self.places[number])))
+        for own, used in zip(new, self._columns[number], strict=True):
+            cross[:, used.at] += own[rows].T @ used.values[rows]
+        return cross
+
+    @classmethod
+    def none(cls) -> "SignatureGram":
+        """Return that of no trace."""
+        return cls([], 0, [], [])
 
     @cached_property
     def totals(self) -> list[Floats]:
@@ -48,24 +88,19 @@ class SignatureGram:
     def beside(self, data: Sequence[Floats]) -> "Gram":
         """Return the view with whitened data (k·n, 1 + t) of each trace: residual r and tangents T."""
         traces = []
-        for number, (new, wide, rows) in enumerate(zip(data, self.columns, self._rows, strict=True)):
+        for number, (new, rows) in enumerate(zip(data, self._rows, strict=True)):
+            own = new.reshape(len(self._columns[number]), -1, new.shape[1])
             grams = [
-                _joined(new[at], wide[at], fixed) for at, fixed in zip(rows, self._fixed[number], strict=True)
+                _joined(own[:, at].reshape(-1, new.shape[1]), self._cross(number, at, own), fixed)
+                for at, fixed in zip(rows, self._fixed[number], strict=True)
             ]
             traces.append(TraceGram(np.stack(grams), np.sum(grams, axis=0), self.places[number]))
         values = sum(len(new) for new in data)
         return Gram(tuple(traces), data[0].shape[1] - 1, self.signatures, values)
 
 
-def _inner(columns: Floats) -> Floats:
-    """Return the Gram matrix of columns; of one array BLAS makes half of the products."""
-    gram: Floats = columns.T @ columns
-    return gram
-
-
-def _joined(new: Floats, fixed: Floats, fixed_gram: Floats) -> Floats:
-    """Return the Gram matrix of columns [new, fixed], that of the latter being known."""
-    cross = new.T @ fixed
+def _joined(new: Floats, cross: Floats, fixed_gram: Floats) -> Floats:
+    """Return the Gram matrix of columns [new, fixed], that of the latter and of both being known."""
     return np.block([[new.T @ new, cross], [cross.T, fixed_gram]])
 
 

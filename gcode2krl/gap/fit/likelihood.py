@@ -15,7 +15,7 @@ from gcode2krl.gap.fit.clusters import cluster_scores
 from gcode2krl.gap.fit.counted_once import CountedOnce
 from gcode2krl.gap.fit.design import NuisanceDesign
 from gcode2krl.gap.fit.fitted import Numbers
-from gcode2krl.gap.fit.gram import SignatureGram
+from gcode2krl.gap.fit.gram import SignatureGram, UsedColumns
 from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
@@ -37,13 +37,16 @@ class Likelihood:
         self.traces, self.noise = tuple(traces), tuple(noise)
         self.design = NuisanceDesign.of(nuisance)
         self._columns = [
-            self._whitened(trace, self.design.columns(number, trace))
+            [
+                self._used(trace, j, own, self.design.places[number])
+                for j, own in enumerate(self.design.columns(number, trace))
+            ]
             for number, trace in enumerate(self.traces)
         ]
         self.once = CountedOnce(self.design)
         self._normal = np.eye(self.design.width)
-        for columns, at in zip(self._columns, self.design.places, strict=True):
-            self._normal[np.ix_(at, at)] += columns.T @ columns
+        for used in (each for own in self._columns for each in own):
+            self._normal[np.ix_(used.at, used.at)] += used.values.T @ used.values
 
     def counting(self, once: CountedOnce) -> "Likelihood":
         """Return the likelihood in which more nuisance gives way to effects of the same form."""
@@ -73,23 +76,29 @@ class Likelihood:
 
     def _split(self, vectors: Floats) -> list[Floats]:
         """Return the rows of vectors (v, …) that belong to each trace."""
-        ends = np.cumsum([len(columns) for columns in self._columns])
+        ends = np.cumsum([trace.measured.size for trace in self.traces])
         return np.split(vectors, ends[:-1])
+
+    def _used(self, trace: Trace, component: int, columns: Floats, places: Ints) -> UsedColumns:
+        """Return the columns (n, c) of a component that are not zero, whitened, and their places of (c,)."""
+        used = np.flatnonzero(columns.any(axis=0))
+        return UsedColumns(
+            self.noise[component].whiten(columns[:, used], trace.segments), np.asarray(places)[used]
+        )
 
     # Nuisance
 
     def _projections(self, whitened: Floats) -> Floats:
         """Return Nᵀ·y (m, …) of whitened vectors (v, …)."""
         sums = np.zeros((self.design.width, *whitened.shape[1:]))
-        for own, columns, at in zip(self._split(whitened), self._columns, self.design.places, strict=True):
-            sums[at] += columns.T @ own
+        for own, columns in zip(self._split(whitened), self._columns, strict=True):
+            for values, used in zip(np.split(own, len(columns)), columns, strict=True):
+                sums[used.at] += used.values.T @ values
         return sums
 
     def _explained(self, b: Floats) -> Floats:
         """Return L⁻¹·N·b (v, …)."""
-        return np.concatenate(
-            [columns @ b[at] for columns, at in zip(self._columns, self.design.places, strict=True)]
-        )
+        return np.concatenate([used.values @ b[used.at] for own in self._columns for used in own])
 
     def nuisance_of(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return b (m,), within its bounds, that fits a whitened vector (v,) best beside some effects."""
@@ -128,10 +137,10 @@ class Likelihood:
 
     def own_nuisance(self, applied: Applied) -> Floats:
         """Return the whitened columns (v, m) of the runs' own nuisance but for that of an effect's form."""
-        columns = np.zeros((len(self.clusters), self.design.width))
-        ends = np.cumsum([0, *(len(own) for own in self._columns)])
-        for number, at in enumerate(self.design.places):
-            columns[ends[number] : ends[number + 1], at] = self._columns[number]
+        columns, first = np.zeros((len(self.clusters), self.design.width)), 0
+        for used in (each for own in self._columns for each in own):
+            columns[first : first + len(used.values), used.at] = used.values
+            first += len(used.values)
         columns[:, self.once.gone(applied)] = 0.0
         columns[:, : self.design.shared] = 0.0
         return columns
@@ -183,12 +192,18 @@ class Likelihood:
 
     def gram(self, signatures: Sequence[Floats]) -> "SignatureGram":
         """Return the fast view of signatures (k, n, s) of each trace."""
+        width = signatures[0].shape[2]
         columns = [
-            np.concatenate([self._whitened(trace, own), nuisance], axis=1)
-            for trace, own, nuisance in zip(self.traces, signatures, self._columns, strict=True)
+            [
+                self._used(trace, j, values, np.arange(width)).beside(used, width, at)
+                for j, (values, used) in enumerate(zip(own, nuisance, strict=True))
+            ]
+            for trace, own, nuisance, at in zip(
+                self.traces, signatures, self._columns, self.design.places, strict=True
+            )
         ]
-        stretches = [np.tile(stretches_of(trace), trace.shape[1]) for trace in self.traces]
-        return SignatureGram(columns, signatures[0].shape[2], self.design.places, stretches)
+        stretches = [stretches_of(trace) for trace in self.traces]
+        return SignatureGram(columns, width, self.design.places, stretches)
 
     def data(self, applied: Sequence[Applied], tangents: Sequence[Floats]) -> list[Floats]:
         """Return whitened [r, T] (k·n, 1 + t) of each trace with some effects, for `SignatureGram.beside`."""

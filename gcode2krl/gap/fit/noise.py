@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.fit.kalman import innovation_gains, innovations
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -26,6 +26,16 @@ _LEAST_LEFT = 0.05
 """Of the power of the lags, along each direction: what the slow part leaves of it to the short part."""
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Of the slow part that is taken off the lags, the largest first that leaves a short part."""
+_WINDOW = 20
+"""Rows over which powers are compared: a spike of some rows spoils one or two windows."""
+_LEAST_WINDOWS = 8
+"""Fewer have no median to speak of."""
+_LOUD = 1.0 + 5.0 * (2.0 / _WINDOW) ** 0.5
+"""Times the median power, five deviations of white noise: a louder window is an event, not the noise."""
+_FAR = 9.0
+"""The same of values that have a memory, whose power scatters more."""
+_ROUNDS = 3
+"""In which calm rows and the memory that tells them are found from each other."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,8 @@ class Noise:
     scale: float
     short_sigma: float
     slow: tuple[Slow, ...] = ()
+    beyond: float = 0.0
+    """What of the short part's rms is beyond what is stated, and not in it."""
 
     @property
     def sigma(self) -> float:
@@ -65,6 +77,16 @@ class Noise:
         """Return (n, c) filtered to white noise of unit variance, each segment by itself."""
         gains, variances = self._gains
         return innovations(values, segments, self.a, self._slow, gains, variances)
+
+    def calm_rows(self, values: Floats, segments: Ints) -> Bools:
+        """Return which rows (n,) of values (n,) are, whitened, about as loud as the median window."""
+        white_, calm = self.whiten(values[:, None], segments)[:, 0], np.ones(len(values), dtype=np.bool_)
+        lengths = segments[:, 1] - segments[:, 0]
+        windows = np.concatenate([np.arange(count) // _WINDOW for count in lengths])
+        firsts = np.repeat(np.cumsum([0, *(-(-lengths[:-1] // _WINDOW))]), lengths)
+        rows = np.concatenate([np.arange(first, last) for first, last in segments])
+        calm[rows] = _calm(white_[rows], windows + firsts, _LOUD, 0.0)
+        return calm
 
     def autocovariance(self, count: int) -> Floats:
         """Return E[x[t]·x[t+k]] for k = 0 … count - 1, the short part scaled to its rms."""
@@ -86,24 +108,27 @@ def fit(
     floor: float,
     slow: Sequence[tuple[Floats, Ints]] = (),
     order: int = _LIMITS.noise_order,
+    *,
+    every_row: bool = False,
 ) -> Noise:
-    """Return the short part of some residuals (n,) with their segments, by least squares over all of them.
+    """Return the short part of some residuals (n,) with their segments, by least squares over calm rows.
 
+    Windows of rows that are far louder than the median one are events and take no part (`calm_rows`), but
+    where ``every_row`` counts.
     ``floor``: smallest rms, from the last decimal of the data; noise is never taken to be less. ``slow``:
     draws of the slow part; the power of their lags is taken off that of the residuals.
     """
-    lagged = _lagged(residuals, order)
-    everything = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
-    power = float(np.mean(everything**2))
+    lagged, windows = _lagged(residuals, order)
     if len(lagged) < _LIMITS.noise_least_rows:
-        return white(max(float(np.sqrt(power)), floor))
+        values = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
+        return white(max(float(np.sqrt(np.mean(values**2))), floor))
+    if not every_row:
+        lagged = lagged[calm_rows(lagged, windows, floor)]
     products = lagged.T @ lagged / len(lagged)
     if slow:
-        drawn = _lagged(slow, order)
-        share = _share_off(products, drawn)
-        products = products - share * (drawn.T @ drawn) / len(drawn)
-        power = max(power - share * float(np.mean(np.concatenate([each for each, _ in slow]) ** 2)), 0.0)
-        power = max(power, float(products[0, 0]))
+        drawn, _ = _lagged(slow, order)
+        products = products - _share_off(products, drawn) * (drawn.T @ drawn) / len(drawn)
+    power = float(products[0, 0])
     rms = max(float(np.sqrt(power)), floor)
     # a tenth of the floor's power: colour is not learnt from the rounding of decimals
     x, y = products[1:, 1:], products[1:, 0]
@@ -114,15 +139,46 @@ def fit(
     return Noise(a, scale, max(rms, scale))
 
 
-def _lagged(residuals: Sequence[tuple[Floats, Ints]], order: int) -> Floats:
-    """Return rows (m, 1 + order) of each value and those before it."""
-    rows = [np.zeros((0, 1 + order))]
+def _lagged(residuals: Sequence[tuple[Floats, Ints]], order: int) -> tuple[Floats, Ints]:
+    """Return rows (m, 1 + order) of each value and those before it, and the number (m,) of their window."""
+    rows, windows, count = [np.zeros((0, 1 + order))], [np.zeros(0, dtype=np.int64)], 0
     for values, segments in residuals:
         for first, last in segments:
             x = values[first:last]
             if len(x) > order + 1:
                 rows.append(np.stack([x[order - i : len(x) - i] for i in range(order + 1)], axis=1))
-    return np.concatenate(rows)
+                windows.append(count + np.arange(len(x) - order) // _WINDOW)
+                count = int(windows[-1][-1]) + 1
+    return np.concatenate(rows), np.concatenate(windows)
+
+
+def calm_rows(lagged: Floats, windows: Ints, floor: float = 0.0) -> Bools:
+    """Return which rows (m,) of values and those before them are in windows about as loud as the median one.
+
+    Compared are the differences of neighbours, then what the memory of the calm rows leaves: both are nearly
+    white, so that no slow part hides a spike or is taken for one.
+    """
+    differences = lagged[:, 0] - lagged[:, 1]
+    near = _calm(lagged[:, 0], windows, _FAR, floor)
+    calm = near & _calm(differences, windows, _LOUD, floor)
+    for _ in range(_ROUNDS):
+        x, y = lagged[calm, 1:], lagged[calm, 0]
+        gram = x.T @ x
+        ridge = 1e-6 * float(np.trace(gram)) + 1e-30
+        a = np.linalg.solve(gram + ridge * np.eye(x.shape[1]), x.T @ y)
+        calm = near & _calm(lagged[:, 0] - lagged[:, 1:] @ a, windows, _LOUD, floor)
+    return calm if np.count_nonzero(calm) >= _LIMITS.noise_least_rows else np.ones_like(calm)
+
+
+def _calm(values: Floats, windows: Ints, most: float, floor: float) -> Bools:
+    """Return which rows (m,) are in windows of at most so many times the median mean square."""
+    counts = np.bincount(windows)
+    if len(counts) < _LEAST_WINDOWS:
+        return np.ones(len(values), dtype=np.bool_)
+    powers = np.bincount(windows, weights=values**2) / counts
+    scatter = np.maximum(_WINDOW / counts, 1.0)  # windows of few rows scatter more
+    calm: Bools = (powers <= most * scatter * max(float(np.median(powers)), floor**2))[windows]
+    return calm
 
 
 def _share_off(products: Floats, drawn: Floats) -> float:
@@ -162,9 +218,13 @@ def drawn_slow(slow: Slow, count: int, generator: np.random.Generator) -> Floats
 def at_most(noise: Noise, sigma: float) -> Noise:
     """Return a model whose short part has no more than this rms, white where it was larger.
 
-    The rest is structure. What an instrument states is its short noise: the slow part has a bound of its own.
+    The rest may be structure, which families find; its size alone is a noisy instrument (`Noise.beyond`).
+    What an instrument states is its short noise: the slow part has a bound of its own.
     """
-    short = noise if noise.short_sigma <= sigma else replace(white(sigma), slow=noise.slow)
+    short = noise
+    if noise.short_sigma > sigma:
+        beyond = float(np.sqrt(noise.short_sigma**2 - sigma**2))
+        short = replace(white(sigma), slow=noise.slow, beyond=beyond)
     most = _LIMITS.noise_most_slow * short.short_sigma
     return replace(short, slow=tuple(replace(each, sigma=min(each.sigma, most)) for each in short.slow))
 

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csc_array, identity
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.gap.beside.decimals import resolution
+from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.blocks import block_means
@@ -26,6 +27,10 @@ _EXACT = 1e-12
 """The floor of drawn noise: it has no decimals."""
 _SLOW_DRAWS = 4
 """Of the slow part, whose lags are taken off the data's."""
+_LEVEL_S, _LEVELS = 0.1, 5
+"""Blocks whose medians are the level of a residual, and how many before and after."""
+_FAR = 8.0
+"""Robust deviations from it beyond which a row is of an event: heavy tails hardly go there."""
 _SAME_MM = 1e-3
 _SAME_RAD = 1e-3
 """Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
@@ -51,7 +56,7 @@ def noise_of(
     )
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     floors = [_floor(traces, stated, j) for j in range(traces[0].shape[1])]
-    residuals = [trace.measured - trace.sample(applied) for trace in traces]
+    residuals = source.without_spikes([trace.measured - trace.sample(applied) for trace in traces])
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
     slow = [
         _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
@@ -75,6 +80,31 @@ def noise_of(
         at_most(unbiased(noise, of_drawn, floor), most)
         for noise, of_drawn, floor in zip(first, again, floors, strict=True)
     ]
+
+
+def _spikes(trace: Trace, rest: Floats) -> Floats:
+    """Return what of a rest (n, k) is far from its level for a moment, beyond a bridge from row to row.
+
+    The level lies between the medians of half a second before and after: it follows steps and whatever is
+    slow.
+    """
+    time_s = trace.time_s
+    length = max(1, round(_LEVEL_S / float(np.median(np.diff(time_s)))))
+    count = len(time_s) // length
+    if count < 2 * _LEVELS:
+        return np.zeros_like(rest)
+    block = np.minimum(np.arange(len(time_s)) // length, count - 1)
+    spikes = np.empty_like(rest)
+    for j, values in enumerate(rest.T):
+        medians = np.median(values[: count * length].reshape(count, length), axis=1)
+        padded = np.pad(medians, _LEVELS, mode="edge")
+        levels = np.median(np.lib.stride_tricks.sliding_window_view(padded, _LEVELS), axis=1)
+        before, after = levels[:count], levels[_LEVELS + 1 :]
+        low, high = np.minimum(before, after)[block], np.maximum(before, after)[block]
+        off = values - np.clip(values, low, high)
+        near = np.abs(off) <= _FAR * usual_deviation(values - medians[block])
+        spikes[:, j] = values - np.interp(time_s, time_s[near], values[near])
+    return spikes
 
 
 def _of_rows(parts: Sequence[SlowPart], trace: Trace) -> tuple[Slow, ...]:
@@ -116,9 +146,9 @@ class _Explained:
         self._width = width
         t = trace.time_s
         count = max(2, round((t[-1] - t[0]) / _LIMITS.noise_slow_s) + 1)
-        knots = np.linspace(t[0], t[-1], count)
-        self.hats = np.maximum(0.0, 1.0 - np.abs(t[:, None] - knots) / (knots[1] - knots[0]))
-        self.hats_gram = self.hats.T @ self.hats + _HATS_RIDGE * len(t) * np.eye(count)
+        self._hats = _hats(t, np.linspace(t[0], t[-1], count))
+        ridge = _HATS_RIDGE * len(t) * identity(count)
+        self._hats_gram = csc_array(self._hats.T @ self._hats + ridge)
 
     def off(self, values: Floats) -> Floats:
         """Return values (n, k) without what effects and nuisance explain."""
@@ -135,8 +165,20 @@ class _Explained:
 
     def fast(self, values: Floats) -> Floats:
         """Return values (n, k) without what is slower than half a second."""
-        quick: Floats = values - self.hats @ np.linalg.solve(self.hats_gram, self.hats.T @ values)
+        from scipy.sparse.linalg import splu
+
+        quick: Floats = values - self._hats @ splu(self._hats_gram).solve(self._hats.T @ values)
         return quick
+
+
+def _hats(time_s: Floats, knots_s: Floats) -> csc_array:
+    """Return hats over time (n, knots), of which each row has two."""
+    apart_s = knots_s[1] - knots_s[0]
+    before = np.clip(np.searchsorted(knots_s, time_s, side="right") - 1, 0, len(knots_s) - 2)
+    share = (time_s - knots_s[before]) / apart_s
+    rows = np.arange(len(time_s))
+    values, columns = np.concatenate([1.0 - share, share]), np.concatenate([before, before + 1])
+    return csc_array((values, (np.tile(rows, 2), columns)), shape=(len(time_s), len(knots_s)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +188,16 @@ class _Source:
     traces: tuple[Trace, ...]
     explained: tuple[_Explained, ...]
     repeats: list[Ints] | None
+
+    def without_spikes(self, residuals: Sequence[Floats]) -> list[Floats]:
+        """Return residuals (n, k) less what is far off for a moment and nothing explains: no noise is that.
+
+        Before anything else, since means and tones would spread it over rows that are calm.
+        """
+        if not self.traces[0].link.has_instrument:
+            return list(residuals)
+        parts = zip(self.traces, self.explained, residuals, strict=True)
+        return [each - _spikes(trace, explained.off(each)) for trace, explained, each in parts]
 
     def noise(
         self,
@@ -163,7 +215,10 @@ class _Source:
         found = []
         for j, (floor, parts) in enumerate(zip(floors, slow, strict=True)):
             off = [own for each in drawn for own in self._component(each, j)] if parts else []
-            found.append(replace(fit(self._component(rests, j), floor, off), slow=parts))
+            # what is commanded has no instrument: where its model is off, at corners, it is so of all rows
+            every_row = not self.traces[0].link.has_instrument
+            short = fit(self._component(rests, j), floor, off, every_row=every_row)
+            found.append(replace(short, slow=parts))
         return found
 
     def _rests(self, values: Sequence[Floats]) -> list[Floats]:
@@ -183,10 +238,15 @@ class _Source:
         return [(without_lines(value), self.traces[0].segments) for value in differences]
 
 
+def are_repeats(traces: Sequence[Trace]) -> bool:
+    """Tell whether runs repeat one program, so that their noise is what differs between them."""
+    return len(traces) > 1 and all(_is_repeat(trace, traces[0]) for trace in traces[1:])
+
+
 def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
     """Return for each trace the rows that belong to the first one's; None where they are no repeats."""
     first = traces[0]
-    if len(traces) < 2 or not all(_is_repeat(trace, first) for trace in traces[1:]):
+    if not are_repeats(traces):
         return None
     return [nearest_rows(trace.time_s, first.time_s) for trace in traces]
 

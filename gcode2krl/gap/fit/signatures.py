@@ -164,6 +164,7 @@ class Signatures:
     def __init__(self) -> None:
         self._by_trace: WeakKeyDictionary[Trace, dict[_Key, Floats]] = WeakKeyDictionary()
         self._made: WeakKeyDictionary[Trace, tuple[object, Any]] = WeakKeyDictionary()
+        self._stacks: WeakKeyDictionary[Trace, tuple[list[_Key], Floats]] = WeakKeyDictionary()
 
     def once(self, trace: Trace, asked: object, make: Callable[[Trace], _Made]) -> _Made:
         """Return what ``make`` makes of a trace for a question, once as long as no other one is asked."""
@@ -179,20 +180,60 @@ class Signatures:
     def columns(self, block: Block, trace: Trace, size: float = 1.0) -> Floats:
         """Return the block's columns (k, n, c) on a trace, none where the effect is not possible there."""
         known = self._by_trace.setdefault(trace, {})
-        key = (size, *block.key, tuple(sorted(block.shape.items())))
+        key = self._key(block, size)
         if key not in known:
             known[key] = _columns(block, trace, size)
         return known[key]
+
+    def stacked(self, blocks: Sequence[Block], trace: Trace) -> Floats:
+        """Return the columns (k, n, s) of blocks side by side, where they are kept from now on.
+
+        But for blocks chosen by looking at the data: with some of it held out others are.
+        """
+        keys = [self._key(block) for block in blocks]
+        if trace in self._stacks and self._stacks[trace][0] == keys:
+            return self._stacks[trace][1]
+        parts = [self.columns(block, trace) for block in blocks]
+        stack, first = unwritten((*trace.shape[::-1], sum(part.shape[2] for part in parts))), 0
+        for block, key, part in zip(blocks, keys, parts, strict=True):
+            own = stack[:, :, first : first + part.shape[2]]
+            for j, column in np.argwhere(part.any(axis=1)).tolist():
+                own[j, :, column] = part[j, :, column]
+            if block.tried == 1.0:
+                self._by_trace[trace][key] = own
+            first += part.shape[2]
+        self._stacks[trace] = keys, stack
+        return stack
+
+    def forget(self) -> None:
+        """Let go of all columns, when a link is judged; what is asked for again is made again."""
+        self._by_trace.clear()
+        self._stacks.clear()
+
+    @staticmethod
+    def _key(block: Block, size: float = 1.0) -> _Key:
+        return (size, *block.key, tuple(sorted(block.shape.items())))
 
 
 def _columns(block: Block, trace: Trace, size: float) -> Floats:
     n, k = trace.shape
     try:
         settings = block.settings(trace, size)
-        columns = np.empty((k, n, len(settings)))
+        columns = unwritten((k, n, len(settings)))
         for number, applied in enumerate(settings):
-            columns[:, :, number] = (trace.sample([applied]) - trace.nominal).T
+            change = (trace.sample([applied]) - trace.nominal).T
+            change[~np.isfinite(change)] = 0.0
+            for j in np.flatnonzero(change.any(axis=1)):
+                columns[j, :, number] = change[j]
     except Gcode2KrlError:
         return np.zeros((k, n, 0))
-    columns[~np.isfinite(columns)] = 0.0
     return columns
+
+
+def unwritten(shape: tuple[int, int, int]) -> Floats:
+    """Return zeros (k, n, c), one column of one component behind the other.
+
+    What is never written takes no memory: most effects of a joint move it alone.
+    """
+    k, n, c = shape
+    return np.zeros((k, c, n)).transpose(0, 2, 1)

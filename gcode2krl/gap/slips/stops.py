@@ -15,6 +15,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Effect, Inputs
 from gcode2krl.effects.builtin.advance_stop import with_stops
 from gcode2krl.gap.beside.clocks import with_table_clock
+from gcode2krl.gap.beside.corners import rows_of_passing
 from gcode2krl.gap.beside.links import MECHANICS, PATH
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.trace import Trace
@@ -126,7 +127,7 @@ def _lateness(pair: Pair, corners: Ints) -> Floats:
     run_s, run_way = gone(trace.time_s, trace.measured, trace.link.least_step)
     planned = trace.link.planned(pair.inputs)
     time_s, way = gone(pair.inputs.time_s, planned[:, list(trace.columns)], 0.0)
-    rows = _nearest_in_order(pair.inputs.position_mm, targets.position_mm[corners])
+    rows = rows_of_passing(pair.inputs.position_mm, targets.position_mm[corners])
     edges = way[np.concatenate([[0], rows, [len(way) - 1]])]
     late = [0.0]
     for at in (_leg(a, b) for a, b in pairwise(edges)):
@@ -139,20 +140,6 @@ def _lateness(pair: Pair, corners: Ints) -> Floats:
 def _leg(start: float, end: float) -> Floats:
     """Return places in the middle third of a leg."""
     return start + (end - start) * np.linspace(0.35, 0.65, 7)
-
-
-def _nearest_in_order(path_mm: Floats, corners_mm: Floats) -> Ints:
-    """Return the samples nearest to corners that are passed one after the other."""
-    rows, first = [], 0
-    for corner in corners_mm:
-        away = np.linalg.norm(path_mm[first:] - corner, axis=1)
-        # the first local minimum that is as near as any: a path may come by again
-        near = np.flatnonzero(away < away.min() + _LIMITS.corner_near_mm)
-        breaks = np.flatnonzero(np.diff(near) > 1)
-        passage = near[: breaks[0] + 1] if len(breaks) else near
-        first += int(passage[np.argmin(away[passage])])
-        rows.append(first)
-    return np.array(rows, dtype=np.int64)
 
 
 def _stopped(pair: Pair, rows: Ints, hold_s: float) -> Pair:
@@ -171,7 +158,7 @@ def _lines(pair: Pair, rows: Ints) -> Ints:
     targets = pair.inputs.targets
     if targets is None:
         return rows[:0]
-    at = _nearest_in_order(pair.inputs.position_mm, targets.position_mm[rows])
+    at = rows_of_passing(pair.inputs.position_mm, targets.position_mm[rows])
     return np.asarray(pair.inputs.source_line[at], dtype=np.int64)
 
 

@@ -105,6 +105,14 @@ def _acceleration(trace: Trace, samples: Ints, at: str | None) -> Against | None
     return Against("acceleration of the tip (mm/s²)", np.linalg.norm(rate, axis=1))
 
 
+def _jerk(trace: Trace, samples: Ints, at: str | None) -> Against | None:
+    joint, inputs = _joint(at), trace.inputs
+    if joint is None:
+        return None
+    acceleration = gradient(gradient(inputs.q_cmd_rad[:, joint], inputs.time_s), inputs.time_s)
+    return Against(f"jerk of {at} (deg/s³)", DEG_PER_RAD * gradient(acceleration, inputs.time_s)[samples])
+
+
 def _force(trace: Trace, samples: Ints, at: str | None) -> Against | None:
     force = trace.inputs.force_base_N[samples]
     if not np.any(force):
@@ -137,6 +145,7 @@ _SHOWN: Mapping[Dependence, _Shown] = {
     Dependence.TRAVEL: _travel,
     Dependence.FORCE: _force,
     Dependence.FORCE_BY_PLACE: _force,
+    Dependence.JERK: _jerk,
     Dependence.ACCELERATION: _acceleration,
     Dependence.VELOCITY: _speed,
     Dependence.SPINDLE_SPEED: _spindle,

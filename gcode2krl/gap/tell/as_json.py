@@ -10,7 +10,9 @@ from gcode2krl.errors import Issue
 from gcode2krl.gap.choose.intervals import Interval
 
 SCHEMA = "gcode2krl/gap/1"
-_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats"})
+_NAMES = {"source": "from"}
+"""Names of the contract that Python keeps for itself."""
+_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats", "moment"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 
@@ -23,8 +25,9 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "at_part": plain(gap.at_part),
         "links": plain(gap.links),
         "where": plain(gap.where),
+        "events": plain(gap.events),
         "causes": plain(gap.causes),
-        "unexplained": plain(gap.unexplained),
+        "unexplained": _unexplained(gap.unexplained),
         "not_examined": plain(gap.not_examined),
         "observable": plain(gap.observable),
         "next_run": _next_run(gap.next_run),
@@ -32,6 +35,14 @@ def gap_object(gap: Any) -> dict[str, Any]:
         "notes": list(gap.notes),
         "issues": [_issue(issue) for issue in gap.issues],
     }
+
+
+def _unexplained(unexplained: Any) -> dict[str, Any]:
+    """Return what is left; a moment is ``t_s`` as in events, and ``at_time_s`` as it was first called."""
+    told: dict[str, Any] = plain(unexplained)
+    for each in told["depends_on"]:
+        each["t_s"] = each["at_time_s"]
+    return told
 
 
 def _next_run(run: Any) -> dict[str, Any] | None:
@@ -51,7 +62,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Interval):
         value = value._asdict()
     if is_dataclass(value):
-        value = {name: each for name, each in _items(value) if not _is_left_out(name, each)}
+        value = {_NAMES.get(name, name): each for name, each in _items(value) if not _is_left_out(name, each)}
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):

@@ -13,12 +13,15 @@ from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import timing_share, timing_sizes
 from gcode2krl.gap.choose.detectable import observable
 from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
+from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.causes import cause_of, slip_cause
 from gcode2krl.gap.tell.dependences import depends_on
+from gcode2krl.gap.tell.events import IMPULSE, events_of, impulses_of
 from gcode2krl.gap.tell.evidence import Depends, evidence_of
+from gcode2krl.gap.tell.instruments import issues_of, noise_of, readings_of_noise
 from gcode2krl.gap.tell.next_run import next_run_of
-from gcode2krl.gap.tell.part_size import at_part, at_part_of
+from gcode2krl.gap.tell.part_size import at_part, at_part_of, run_sizes
 from gcode2krl.gap.tell.residuals import Residual, residuals_of
 from gcode2krl.gap.tell.result import (
     AtPart,
@@ -47,26 +50,28 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
         for judged in signals
         if judged is largest or judged.verdict != "no_gap"
     }
-    unexplained = _unexplained(largest, signals)
+    dependences = list(_dependences(signals))
+    unexplained = _unexplained(largest, [each for each, _ in dependences])
     of_largest = residuals[largest.link] if largest is not None else []
     return Gap(
         verdict=_verdict(judgements, slips),
-        gap=_size(_with_largest_gap(judgements, largest), slips),
+        gap=_size(_with_largest_gap(judgements, largest), slips, residuals),
         links=tuple(_links(judgements, slips)),
         at_part=_at_part(judgements, slips, residuals),
+        events=tuple(event for judgement in signals for event in events_of(judgement)),
         where=_where(largest, judgements, of_largest),
-        causes=_causes(judgements, slips),
+        causes=_causes(judgements, slips, context.pairs),
         unexplained=unexplained,
         not_examined=tuple(_not_examined(judgements, slips)),
         observable=tuple(
             Detectable(**entry) for judgement in signals for entry in observable(judgement.examination)
         ),
-        next_run=next_run_of(context, signals, unexplained.depends_on),
+        next_run=next_run_of(context, signals, [each for each in dependences if each[0].form != IMPULSE]),
         named=(
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
         ),
-        issues=(*issues, *_issues_of_runs(context.pairs)),
+        issues=(*issues, *_issues_of_runs(context.pairs), *issues_of(signals)),
         runs=tuple(pair.name for pair in context.pairs),
         notes=tuple(_notes(context.pairs, signals)),
         evidence=None
@@ -127,7 +132,9 @@ def _verdict(judgements: Sequence[Judged], slips: Sequence[Slip]) -> str:
     return "partly_explained"
 
 
-def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
+def _size(
+    largest: Judged | None, slips: Sequence[Slip], residuals: Mapping[Link, Sequence[Residual]]
+) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
         return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
@@ -142,6 +149,7 @@ def _size(largest: Judged | None, slips: Sequence[Slip]) -> GapSize:
         max_after=factor * size.largest_after,
         shrink=largest.shrink,
         held_out=largest.held_out,
+        per_run=run_sizes(largest, residuals.get(link, ())) if isinstance(largest, Judgement) else (),
     )
 
 
@@ -176,7 +184,7 @@ def _timing(path: Judgement) -> LinkResult:
         link=TIMING.name,
         rms_before=before_s,
         rms_after=after_s,
-        noise=None,
+        floor=None,
         unit=TIMING.unit,
         verdict=path.verdict if _is_timing(path) else "no_gap",
     )
@@ -190,7 +198,8 @@ def _link(judgement: Judged, slipped: bool) -> LinkResult:
         link=judgement.link.name,
         rms_before=factor * size.before**0.5,
         rms_after=factor * size.after**0.5,
-        noise=factor * size.floor**0.5,
+        floor=factor * size.floor**0.5,
+        noise=noise_of(judgement) if isinstance(judgement, Judgement) else None,
         unit=judgement.link.unit,
         verdict="explained" if slipped and verdict == "no_gap" else verdict,
         offset_deg=_zeros_deg(judgement) if isinstance(judgement, Judgement) else None,
@@ -223,12 +232,15 @@ def _where(largest: Judgement | None, judgements: Sequence[Judged], residuals: S
     return replace(place(traces, shapes, residuals[0].noise, largest.applied), signals=signals)
 
 
-def _causes(judgements: Sequence[Judged], slips: Sequence[Slip]) -> tuple[CauseResult, ...]:
+def _causes(
+    judgements: Sequence[Judged], slips: Sequence[Slip], pairs: Sequence[Pair]
+) -> tuple[CauseResult, ...]:
     """Return the causes of all links, the most probable first."""
     causes = [slip_cause(slip) for slip in slips]
     for judgement in judgements:
         causes += [
-            cause_of(cause, judgement, _reported_in(cause, judgement).name) for cause in judgement.reported
+            cause_of(cause, judgement, _reported_in(cause, judgement).name, pairs)
+            for cause in judgement.reported
         ]
     return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
@@ -239,13 +251,20 @@ def _reported_in(cause: Cause, judgement: Judged) -> Link:
     return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
 
 
-def _unexplained(largest: Judgement | None, signals: Sequence[Judgement] = ()) -> Unexplained:
+def _dependences(signals: Sequence[Judgement]) -> Iterator[tuple[DependsOnResult, Evidence | None]]:
+    """Yield on what depends what is left of all links, the largest gap first; of a family what it says."""
+    links: set[str] = set()
+    for judgement in sorted(signals, key=_weight, reverse=True):
+        own: list[tuple[DependsOnResult, Evidence | None]] = [(each, None) for each in impulses_of(judgement)]
+        own += depends_on(judgement, larger_links=len(links | {each.link for each, _ in own}))
+        links |= {each.link for each, _ in own}
+        yield from own
+
+
+def _unexplained(largest: Judgement | None, families: Sequence[DependsOnResult] = ()) -> Unexplained:
     """Return what is left of the largest gap, and on what depends what is left of all of them."""
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
-    families: list[DependsOnResult] = []
-    for judgement in sorted(signals, key=_weight, reverse=True):
-        families += depends_on(judgement, larger_links=len({each.link for each in families}))
     size = largest.told
     left = bool(size.significant) and largest.verdict != "explained"
     significant = left or any(each.link == largest.link.name for each in families)
@@ -292,3 +311,4 @@ def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[s
     for judgement in judgements:
         for trace in judgement.traces:
             yield from (f"{judgement.link.name}, {trace.run}: {what} left out" for what in trace.left_out)
+    yield from readings_of_noise(judgements)

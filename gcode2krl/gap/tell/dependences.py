@@ -6,9 +6,13 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
+from gcode2krl.gap.beside.events import line_at
+from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.choose.likely_families import FamilyProbability, family_probabilities
 from gcode2krl.gap.families.evidence import Evidence
+from gcode2krl.gap.tell.course import course_of
 from gcode2krl.gap.tell.result import DependsOnResult
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -29,10 +33,10 @@ _AXES = ("fx", "fy", "fz")
 _TIP = "tip"
 
 
-def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[DependsOnResult]:
+def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[DependsOnResult, Evidence]]:
     """Yield on what the gap of a link without a name, or beside named causes, may depend; best first.
 
-    ``larger_links`` have a larger gap without a name.
+    With each what the family says. ``larger_links`` have a larger gap without a name.
     """
     rest = judgement.rest
     if rest is None or judgement.verdict in ("no_gap", "explained"):
@@ -41,31 +45,54 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[DependsO
         return
     for told in family_probabilities(rest, larger_links):
         if told.probability >= _LIMITS.least_probability:
-            yield _result(judgement, told)
+            yield _result(judgement, told), told.evidence
 
 
 def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
-    evidence, signals = told.evidence, told.evidence.signal
+    evidence, traces = told.evidence, judgement.every
     is_step = evidence.on is Dependence.RUN_TIME_STEP
+    is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
+    signals = evidence.signal
+    if is_vector:
+        signals = tuple(_in_base(trace, own) for trace, own in zip(traces, signals, strict=True))
     largest = _largest(signals)
     along = largest if is_step else _main_axis(signals)
     moment = evidence.at if is_step else None
-    is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
     length = float(np.linalg.norm(along))
+    is_scalar = signals[0].shape[1] == 1
+    course = None
+    if (is_scalar or is_vector) and length > 0.0:
+        turned = judgement.factor * (np.ones(1) if is_scalar else along / length)
+        values = [own @ turned for own in signals]
+        course = course_of(traces, values, evidence.on, evidence.place.joint, judgement.link.unit)
     return DependsOnResult(
         link=judgement.link.name,
-        at=_at(evidence, signals),
+        at=_at(evidence, evidence.signal),
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
         probability=told.probability,
         share=told.features.share,
         tests=told.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
-        run=None if moment is None else judgement.every[moment[0]].run,
+        run=None if moment is None else traces[moment[0]].run,
+        line=None if moment is None else line_at(traces[moment[0]].inputs, moment[1]),
         size=judgement.factor * float(np.linalg.norm(largest)),
         unit=judgement.link.unit,
         direction=tuple((along / length).tolist()) if is_vector and length > 0.0 else None,
+        frequency_hz=evidence.at[1] if evidence.on is Dependence.TONE and evidence.at else None,
+        course=course,
     )
+
+
+def _in_base(trace: Trace, values: Floats) -> Floats:
+    """Return vectors (n, 3) of a trace along the axes of ``$BASE``."""
+    if not (trace.in_sensor_frame or trace.in_tool_frame):
+        return values
+    inputs = trace.inputs
+    rotation = inputs.sensor_rotation if trace.in_sensor_frame else inputs.tool_rotation
+    rows = nearest_rows(inputs.time_s, trace.time_s)
+    turned: Floats = np.einsum("nij,nj->ni", rotation[rows], values)
+    return turned
 
 
 def _at(evidence: Evidence, signals: tuple[Floats, ...]) -> str:

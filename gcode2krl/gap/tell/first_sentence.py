@@ -3,8 +3,17 @@
 import math
 from collections.abc import Sequence
 
-from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap, IntervalResult, PhaseResult
-from gcode2krl.gap.tell.words import describe, listed, named, rounded, what_there_is
+from gcode2krl.gap.tell.events import IMPULSE
+from gcode2krl.gap.tell.result import (
+    AtPart,
+    CauseResult,
+    EventResult,
+    Gap,
+    IntervalResult,
+    MomentResult,
+    PhaseResult,
+)
+from gcode2krl.gap.tell.words import describe, listed, named, number, rounded, unit_of, what_there_is
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -33,7 +42,52 @@ def headline(gap: Gap) -> str:
         return f"Set-up slip: {slip.words}."
     if gap.verdict == "no_gap":
         return _no_gap(gap)
-    return " ".join(filter(None, (f"{_off(gap)}{_mostly(gap)}: {_why(gap)}.", _left(gap))))
+    hit = _hit(gap)
+    if hit and not gap.causes and all(each.form == IMPULSE for each in gap.unexplained.depends_on):
+        return f"{hit}. What else the runs differ by, noise and normal mismatch explain."
+    usual = " ".join(filter(None, (f"{_off(gap)}{_mostly(gap)}: {_why(gap)}.", _left(gap))))
+    return f"{hit}. {usual}" if hit else usual
+
+
+def _hit(gap: Gap) -> str:
+    """Return what happened in a moment, and what it left behind; nothing where nothing did.
+
+    What a force sensor and the tip, or a joint from then on, show at once was a blow; one reading alone may
+    be one of its instrument.
+    """
+    impulses = [each for each in gap.events if each.what == IMPULSE]
+    event = max(impulses, key=lambda each: (each.link == "force", each.size), default=None)
+    if event is None:
+        return ""
+    step = next((cause for cause in gap.named_causes if _is_at(cause.moment, event)), None)
+    at = f"at {event.t_s:.2f} s of {event.run}, line {event.line}"
+    others = [each for each in gap.events if each.what != "burst" and each.link != event.link]
+    together = [each for each in others if each.run == event.run and _is_near(each.t_s, event.t_s)]
+    if event.link == "force" and (step or together):
+        said = f"The tool hit something {at}: {_force(event.size)}"
+    else:
+        where = "force" if event.link == "force" else f"{event.link} signal"
+        size = _force(event.size) if event.unit == "N" else amount(event.size, event.unit)
+        said = f"The {where} jumps {at}, for {amount(max(event.lasts_s, 1e-3), 's')}: {size}"
+    if step is None:
+        return said
+    name = next((name for name in step.parameters if name.startswith("size_")), None)
+    if name is None:
+        return said
+    off = f"{number(abs(step.parameters[name].value))} {unit_of(name)[1]}"
+    return f"{said}; since then {'the tip' if step.target == 'tip' else step.target} is off by {off}"
+
+
+def _is_at(moment: MomentResult | None, event: EventResult) -> bool:
+    return moment is not None and moment.run == event.run and _is_near(moment.t_s, event.t_s)
+
+
+def _is_near(one_s: float, other_s: float) -> bool:
+    return abs(one_s - other_s) < _LIMITS.same_moment_s
+
+
+def _force(size_N: float) -> str:
+    return f"{rounded(size_N / 1000.0)} kN" if size_N >= 1000.0 else f"{rounded(size_N)} N"
 
 
 def _no_gap(gap: Gap) -> str:
@@ -59,12 +113,20 @@ def _off(gap: Gap) -> str:
     if at is None:
         size = gap.gap
         return "The runs differ" if size.rms_before is None else f"{rounded(size.rms_before)} {size.unit} RMS"
-    size_text = amount(at.rms_before, at.unit)
+    size_text, worst = amount(at.rms_before, at.unit), _worst_run(at)
     if at.what != "time":
-        return _OFF[at.what].format(size=size_text)
+        return _OFF[at.what].format(size=size_text) + worst
     if at.link == "timing":
-        return f"The robot is {size_text} RMS early or late on its path"
+        return f"The robot is {size_text} RMS early or late on its path{worst}"
     return f"Time stamps are off by {size_text}"
+
+
+def _worst_run(at: AtPart) -> str:
+    """Return the size of the gap in the run that is off most, where it is off by much more than all are."""
+    worst = max(at.per_run, key=lambda each: each.rms_before, default=None)
+    if worst is None or worst.rms_before < _LIMITS.worst_run * at.rms_before:
+        return ""
+    return f", {amount(worst.rms_before, at.unit)} in {worst.run}"
 
 
 def _mostly(gap: Gap) -> str:
@@ -82,6 +144,8 @@ def _mostly(gap: Gap) -> str:
     if first.rms < _LIMITS.phase_over_rest * _rms_of(phases[1:]):
         return ""
     share = next(words for least, words in _SHARES.items() if first.share >= least)
+    if at is not None and _worst_run(at):
+        share = share.replace("of it", "of the gap")  # "it" would be that run's
     joint = f" of axis {joints[0].joint[1:]}" if first.phase == "reversal" and joints else ""
     return f", {share} {_PHASES[first.phase]}{joint}"
 
@@ -124,7 +188,16 @@ def _left(gap: Gap) -> str:
         if gap.gap.shrink is None:
             return ""
         return f"{model} {gap.gap.shrink:.0%} of the gap is gone{held}{_rest(gap)}."
-    return f"{model} {amount(at.rms_after, at.unit)} are left{held}{_beside(at)}{_rest(gap)}."
+    left = amount(at.rms_after, at.unit)
+    before = at.held_out_before
+    if held and before is not None and not _is_about(before, at.rms_before):
+        left += f" of {amount(before, at.unit)}"
+    return f"{model} {left} are left{held}{_beside(at)}{_rest(gap)}."
+
+
+def _is_about(size: float, other: float) -> bool:
+    """Tell whether two sizes are so near that one cannot be mistaken for another share of a gap."""
+    return max(size, other) < _LIMITS.worst_run * min(size, other)
 
 
 def _beside(at: AtPart) -> str:

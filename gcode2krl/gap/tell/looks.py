@@ -28,7 +28,7 @@ def gap_html(gap: Gap) -> str:
                 each.link,
                 number(each.rms_before),
                 number(each.rms_after),
-                number(each.noise),
+                number(each.floor),
                 each.unit,
                 each.verdict,
             )

@@ -6,12 +6,13 @@ import numpy as np
 
 from gcode2krl.gap.beside.links import FORCE, TIMING, Link
 from gcode2krl.gap.beside.timing import timing_sizes
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.judged import Judged, Judgement
 from gcode2krl.gap.slips.slip import Slip
 from gcode2krl.gap.tell.abscissa import knows_place
 from gcode2krl.gap.tell.evidence import tip_of
 from gcode2krl.gap.tell.residuals import Residual, rms_length
-from gcode2krl.gap.tell.result import AtPart
+from gcode2krl.gap.tell.result import AtPart, RunSize
 
 _ORDER = ("tip", "part", "time", "force", "joints")
 """What a person asks for first."""
@@ -37,6 +38,20 @@ def at_part(
         else:
             sizes.append(_in_space(judged, residuals.get(judged.link, ())))
     return max(sizes, key=lambda size: (-_ORDER.index(size.what), size.rms_before), default=None)
+
+
+def run_sizes(judged: Judgement, residuals: Sequence[Residual]) -> tuple[RunSize, ...]:
+    """Return the size of the gap of every run of a link, in the report's unit."""
+    factor = judged.factor
+    return tuple(
+        _run_size(judged, each.trace, factor * rms_length([each.before]), factor * rms_length([each.after]))
+        for each in residuals
+    )
+
+
+def _run_size(judged: Judgement, trace: Trace, before: float, after: float | None) -> RunSize:
+    explains = any(each.run == trace.run for each in judged.traces)
+    return RunSize(run=trace.run, rms_before=before, rms_after=after, held_out=not explains)
 
 
 def at_part_of(slip: Slip) -> AtPart | None:
@@ -73,14 +88,28 @@ def _by_clocks(judged: Judgement) -> AtPart:
 
 
 def _in_time(judged: Judgement) -> AtPart:
-    before, after = timing_sizes(judged.traces, (*judged.usual, *judged.applied))
-    return AtPart(what="time", unit="s", rms_before=before, rms_after=after, noise=None, link=TIMING.name)
+    traces, causes = judged.every or judged.traces, (*judged.usual, *judged.applied)
+    before, after = timing_sizes(traces, causes)
+    return AtPart(
+        what="time",
+        unit="s",
+        rms_before=before,
+        rms_after=after,
+        noise=None,
+        link=TIMING.name,
+        per_run=tuple(_run_size(judged, trace, *timing_sizes([trace], causes)) for trace in traces),
+    )
 
 
 def _in_space(judged: Judged, residuals: Sequence[Residual]) -> AtPart:
-    if judged.link.of_joints and all(knows_place(each.trace.inputs) for each in residuals):
+    if (
+        isinstance(judged, Judgement)
+        and judged.link.of_joints
+        and all(knows_place(each.trace.inputs) for each in residuals)
+    ):
         return _converted(judged, residuals)
     size, factor = judged.told, judged.factor
+    before = rms_length([each.before for each in residuals]) if residuals else size.before**0.5
     if judged.link.of_joints:
         what = "joints"
     elif judged.link is FORCE:
@@ -90,20 +119,22 @@ def _in_space(judged: Judged, residuals: Sequence[Residual]) -> AtPart:
     return AtPart(
         what=what,
         unit=judged.link.unit,
-        rms_before=factor * size.before**0.5,
+        rms_before=factor * before,
         rms_after=factor * size.after**0.5,
         noise=factor * size.floor**0.5,
         link=judged.link.name,
+        held_out_before=factor * size.before**0.5 if judged.held_out else None,
+        per_run=run_sizes(judged, residuals) if isinstance(judged, Judgement) else (),
     )
 
 
-def _converted(judged: Judged, residuals: Sequence[Residual]) -> AtPart:
+def _converted(judged: Judgement, residuals: Sequence[Residual]) -> AtPart:
     """Return a gap in joints as what it is at the tip, along the program: the Jacobian times its shape.
 
     What is left of it is by the share that is gone on held-out data.
     """
-    before_mm = rms_length([tip_of(each.trace, each.shape) for each in residuals])
-    shrink = judged.shrink
+    at_tip = [tip_of(each.trace, each.shape) for each in residuals]
+    before_mm, shrink = rms_length(at_tip), judged.shrink
     return AtPart(
         what="tip",
         unit="mm",
@@ -111,4 +142,8 @@ def _converted(judged: Judged, residuals: Sequence[Residual]) -> AtPart:
         rms_after=None if shrink is None else before_mm * float(np.sqrt(1.0 - shrink)),
         noise=None,
         link=judged.link.name,
+        per_run=tuple(
+            _run_size(judged, each.trace, rms_length([moved]), None)
+            for each, moved in zip(residuals, at_tip, strict=True)
+        ),
     )

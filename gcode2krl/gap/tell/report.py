@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from gcode2krl.gap.tell.first_sentence import headline, stretch
-from gcode2krl.gap.tell.result import CauseResult, Gap, IntervalResult, LinkResult
-from gcode2krl.gap.tell.words import alike, depends, describe, kind, next_run, number
+from gcode2krl.gap.tell.result import CauseResult, Gap, GapSize, IntervalResult, LinkResult
+from gcode2krl.gap.tell.words import alike, depends, describe, happened, kind, next_run, number
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -20,6 +20,9 @@ def _lines(gap: Gap) -> Iterator[str]:
     if gap.links:
         yield from ("", "link        before      after       noise       verdict")
         yield from (_link(link) for link in gap.links)
+    aside = "; the table above is of data not used" if gap.gap.held_out else ""
+    yield from _section(f"run by run, those that explain included{aside}", _run_lines(gap.gap))
+    yield from _section("what happened", (happened(each) for each in gap.events[: _LIMITS.report_lines]))
     yield from _section("where", where_lines(gap))
     yield from _section(
         "causes", (line for cause in gap.causes[: _LIMITS.report_lines] for line in _cause(cause))
@@ -82,8 +85,17 @@ def left_lines(gap: Gap) -> Iterator[str]:
 def _link(link: LinkResult) -> str:
     return (
         f"{link.link:<11} {number(link.rms_before):<11} {number(link.rms_after):<11} "
-        f"{number(link.noise):<11} {link.verdict} ({link.unit})"
+        f"{number(link.floor):<11} {link.verdict} ({link.unit})"
     )
+
+
+def _run_lines(size: GapSize) -> Iterator[str]:
+    """Yield the gap of each run, where there are several."""
+    for each in size.per_run if len(size.per_run) > 1 else ():
+        before, after = number(each.rms_before), number(each.rms_after)
+        with_causes = "" if before == after else f", {after} with the named causes"
+        held_out = ", held out" if each.held_out else ""
+        yield f"{each.run}: {before} {size.unit} RMS{with_causes}{held_out}"
 
 
 def _cause(cause: CauseResult) -> Iterator[str]:

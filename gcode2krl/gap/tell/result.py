@@ -19,8 +19,23 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunSize:
+    """The gap of one run, in the unit of what it is part of."""
+
+    run: str
+    rms_before: float
+    rms_after: float | None
+    """With the named causes as the runs that explain say they are; None where that is not known."""
+    held_out: bool
+    """The run only tests: nothing was chosen or fitted with it."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class GapSize:
-    """The signal with the largest gap over its noise, in its unit; None where nothing was compared."""
+    """The signal with the largest gap over its noise, in its unit; None where nothing was compared.
+
+    ``rms_before``, ``rms_after``, the largest values and ``shrink`` are of held-out data where there are any.
+    """
 
     signal: str
     unit: str
@@ -33,6 +48,8 @@ class GapSize:
     shrink: float | None = None
     """Share of the explainable gap that is gone on held-out data."""
     held_out: bool = False
+    per_run: tuple[RunSize, ...] = ()
+    """Of every run, those that explain and those that are held out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +61,48 @@ class AtPart:
     in deg, where nothing else is known."""
     unit: str
     rms_before: float
+    """Over all runs."""
     rms_after: float | None
     """With the named causes in the model, on held-out data; None where that is not known."""
     noise: float | None
     """In the same unit; None where the size was converted, which takes the noise out of it."""
     link: str
     """The link that shows it."""
+    held_out_before: float | None = None
+    """On the data that ``rms_after`` is of; None where that is not known."""
+    per_run: tuple[RunSize, ...] = ()
+    """Of every run; empty where a run has no size of its own, as for clocks, scans and slips."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseResult:
+    """The noise of a link's instrument: rms over its components of their standard deviations."""
+
+    stated: float | None
+    """As run.toml states it."""
+    learnt: float
+    """What noise was taken to be, with what it forgets within seconds."""
+    short: float
+    """What of it is forgotten within milliseconds: the other reading, where nothing else is known."""
+    source: str
+    """In the JSON object ``from``: repeats, each run by itself, or (of poses) what no effect explains."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventResult:
+    """What was rough or far off for a moment."""
+
+    link: str
+    run: str
+    t_s: float
+    line: int
+    """Of the G-code; 0 where the robot is on none."""
+    what: str
+    """impulse, slip, or burst: the instrument's, left out."""
+    size: float
+    """The largest deviation from the level around it, of a slip the change that stays."""
+    unit: str
+    lasts_s: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,10 +112,13 @@ class LinkResult:
     link: str
     rms_before: float
     rms_after: float
-    noise: float | None
+    floor: float | None
+    """Length of noise and normal mismatch together."""
     unit: str
     verdict: str
     """no_gap, explained, partly_explained or unexplained."""
+    noise: NoiseResult | None = None
+    """None where nothing measures it, or nothing was learnt."""
     offset_deg: Mapping[str, float] | None = None
     """Joint -> zero between its two encoders, where the link has two."""
 
@@ -147,6 +203,30 @@ class RivalResult:
     """By how much it is worse than the cause."""
 
 
+@dataclass(frozen=True)
+class UnknownAt:
+    """Something that the library lacks, by its place and the input that it depends on."""
+
+    kind: str = field(default="unknown", init=False)
+    at: str
+    on: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """How a deviation goes over an input: a few points, each the mean of a stretch of the input."""
+
+    over: str
+    """The input, ``torque of A2``."""
+    over_unit: str
+    unit: str
+    """Of the deviation, along ``direction`` where there is one."""
+    points: tuple[tuple[float, float], ...]
+    """(input, deviation), by rising input."""
+    run: str | None = None
+    """Where each run has a course of its own, that which this one is of: the run that deviates most."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class DependsOnResult:
     """On what a gap without a name depends: where, on which input, in which form."""
@@ -157,18 +237,24 @@ class DependsOnResult:
     on: str
     """An input: the value of an `effects.dependence.Dependence`, "time in the run" for a step too."""
     form: str
-    """step, drift, periodic, loop or smooth."""
+    """impulse, step, drift, periodic, loop or smooth."""
     probability: float
     share: float
     """Of the gap's power beyond noise that it takes."""
     at_time_s: float | None = None
-    """Of a step, its moment in `run`."""
+    """Of a step or an impulse, its moment in `run`; in the JSON object ``t_s`` too."""
     run: str | None = None
+    line: int | None = None
+    """Of the G-code, at that moment."""
     size: float | None = None
     """Of a step its height, else the largest deviation, in ``unit``."""
     unit: str | None = None
     direction: tuple[float, ...] | None = None
     """Unit vector in ``$BASE`` of what moves the tip or is a force."""
+    frequency_hz: float | None = None
+    """Of a tone."""
+    course: Course | None = None
+    """Of a drift or a smooth function, how it goes over its input."""
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`choose.features.FamilyFeatures`)."""
 
@@ -202,6 +288,16 @@ class NextRun:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MomentResult:
+    """A moment of a run."""
+
+    run: str
+    t_s: float
+    line: int
+    """Of the G-code."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CauseResult:
     """One effect at one target, a set-up slip included."""
 
@@ -216,8 +312,9 @@ class CauseResult:
     rms_after: float | None
     words: str | None = None
     """Of a set-up slip, what shows it; None for other causes."""
-    indistinguishable_from: tuple[EffectAt, ...] = ()
-    """Others that these data cannot tell from it: they share the probability."""
+    indistinguishable_from: tuple[EffectAt | UnknownAt, ...] = ()
+    """Others that these data cannot tell from it: they share the probability. The last one may be something
+    of its place and input that the library lacks."""
     rivals: tuple[RivalResult, ...] | None = None
     """None where no other effect was compared with it."""
     family: str | None = None
@@ -229,6 +326,8 @@ class CauseResult:
     constant: Constancy | None = None
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`choose.features.Features`); None where not tested."""
+    moment: MomentResult | None = None
+    """Of what begins at a moment: where that is in its run."""
 
     @property
     def is_named(self) -> bool:
@@ -294,6 +393,8 @@ class Gap:
     notes: tuple[str, ...] = ()
     at_part: AtPart | None = None
     """None where there is no gap, or nothing to compare."""
+    events: tuple[EventResult, ...] = ()
+    """What happened in a moment of one run, in the order of links and runs."""
     evidence: Evidence | None = field(default=None, repr=False, compare=False)
     """What the pictures are drawn from; not in the JSON object."""
 

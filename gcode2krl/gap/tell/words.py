@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, NextRun
+from gcode2krl.gap.tell.result import CauseResult, DependsOnResult, EffectAt, EventResult, NextRun, UnknownAt
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
@@ -12,7 +12,7 @@ _AXES = ("x", "y", "z")
 _UNITS = {
     name: name
     for name in ("mm", "deg", "rad", "mrad", "N", "Nm", "kNm", "kg", "s", "ms", "h", "m", "cm", "K")
-} | {"um": "µm", "hz": "Hz", "s2": "s²", "krpm": "1000/min"}
+} | {"um": "µm", "hz": "Hz", "s2": "s²", "s3": "s³", "krpm": "1000/min", "percent": "%"}
 """Words at the end of a parameter's name that are units -> how they are written."""
 _TARGETS = {
     "tracker": "the tracker",
@@ -20,8 +20,14 @@ _TARGETS = {
     "controller": "the controller's log",
     "q_cmd": "the commanded joints",
     "q_load": "the load encoders",
+    "all": "all axes",
 }
 _FORCE_AXES = ("fx", "fy", "fz")
+_EVENTS = {
+    "impulse": "an impulse of {size} in {link}",
+    "slip": "a slip of {size} in {link}, which stays",
+    "burst": "a burst of {size} in {link}, its instrument's: left out",
+}
 _FORMS = {
     "drift": "a drift with {on}",
     "periodic": "periodic in {on}",
@@ -85,7 +91,10 @@ def describe(cause: CauseResult, most: int | None = None) -> str:
 
     Components of a vector stand in brackets; where there are more than ``most`` numbers none is given.
     """
-    numbers = _numbers(cause.parameters)
+    moment = cause.moment
+    numbers = _numbers({k: v for k, v in cause.parameters.items() if moment is None or k != "at_s"})
+    if moment is not None:
+        numbers.insert(0, f"at {moment.t_s:.2f} s of {moment.run}, line {moment.line}")
     if most is not None and len(numbers) > most:
         numbers = []
     return ", ".join([named(cause.effect, cause.target), *numbers])
@@ -127,14 +136,27 @@ def listed(words: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
-def alike(effects: Sequence[EffectAt]) -> str:
+def alike(others: Sequence[EffectAt | UnknownAt]) -> str:
     """Return what a cause cannot be told from."""
-    return listed([named(each.effect, each.target) for each in effects], "or")
+    return listed([_other(each) for each in others], "or")
+
+
+def _other(other: EffectAt | UnknownAt) -> str:
+    if isinstance(other, UnknownAt):
+        return f"something that the library lacks ({other.at}, {other.on})"
+    return named(other.effect, other.target)
+
+
+def happened(event: EventResult) -> str:
+    """Return what happened in a moment: when, on which line, what, how large and for how long."""
+    line = f", line {event.line}" if event.line else ""
+    what = _EVENTS[event.what].format(size=f"{rounded(event.size)} {event.unit}", link=event.link)
+    return f"{event.t_s:.2f} s of {event.run}{line}: {what}, for {rounded(1000.0 * event.lasts_s)} ms"
 
 
 def depends(found: DependsOnResult) -> str:
     """Return where a gap is and on what it depends: ``tip, a step at 11.2 s of run-1 and all later runs``."""
-    return ", ".join([_place(found), _form(found), *_size(found)])
+    return ", ".join([_place(found), _form(found), *_size(found), *_course(found)])
 
 
 def what_there_is(found: DependsOnResult) -> str:
@@ -144,15 +166,38 @@ def what_there_is(found: DependsOnResult) -> str:
     return ", ".join([f"{_form(found)} {where}", *_size(found)])
 
 
+def _course(found: DependsOnResult) -> list[str]:
+    """Return a course by its ends and, where it lies between them, its farthest point from their line."""
+    course = found.course
+    if course is None:
+        return []
+    (x0, y0), *_, (x1, y1) = course.points
+
+    def bend(point: tuple[float, float]) -> float:
+        return abs(point[1] - y0 - (y1 - y0) * (point[0] - x0) / (x1 - x0))
+
+    far = max(course.points, key=bend)
+    told = [(x0, y0), (x1, y1)]
+    if bend(far) > max(abs(y1 - y0), max(abs(y) for _, y in course.points)) / 2.0:
+        told.insert(1, far)
+    words = [f"{rounded(y)} {course.unit} at {rounded(x)} {course.over_unit}" for x, y in told]
+    run = f" of {course.run}" if course.run else ""
+    return [f"over {course.over}{run}: {' to '.join(words)}"]
+
+
 def _place(found: DependsOnResult) -> str:
     """Return the place; the direction says more than the axis of a force."""
     return "force" if found.at in _FORCE_AXES else found.at
 
 
 def _form(found: DependsOnResult) -> str:
-    if found.form == "step" and found.at_time_s is not None:
-        run = f" of {found.run} and all later runs" if found.run else ""
-        return f"a step at {found.at_time_s:.1f} s{run}"
+    if found.form in ("step", "impulse") and found.at_time_s is not None:
+        line = f", line {found.line}" if found.line else ""
+        later = " and all later runs" if found.form == "step" else ""
+        run = f" of {found.run}{line}{later}" if found.run else ""
+        return f"{'a' if found.form == 'step' else 'an'} {found.form} at {found.at_time_s:.1f} s{run}"
+    if found.frequency_hz is not None:
+        return f"a tone of {number(found.frequency_hz)} Hz"
     return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
 
 

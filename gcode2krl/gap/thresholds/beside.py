@@ -67,6 +67,9 @@ class BesideThresholds:
     stretch_s: float = physics(
         1.0, "longer than an instrument remembers; rows of one stretch stay together in every split"
     )
+    stretches_most: int = convention(
+        120, "stretches of one run: of more its scatter is known well enough, and their memory grows"
+    )
     burst_s: float = convention(0.1, "over which the roughness of a signal tells a burst of its instrument")
     burst_times: float = convention(
         4.0, "times its usual roughness a signal is in a burst; white noise is not in 300,000 rows"
@@ -77,6 +80,29 @@ class BesideThresholds:
     bursts_most: float = convention(
         0.15, "share of a component's rows up to which bursts are left out: more is how the signal is"
     )
+    pulse_around_s: float = convention(0.4, "around a pulse: the level it leaves and comes back to")
+    pulse_widths_s: tuple[float, ...] = convention(
+        (0.02, 0.05, 0.1), "of pulses that are looked for: blows and snags take 20 to 100 ms"
+    )
+    pulse_deviations: float = calibrated(
+        12.0, DEVELOPMENT, "robust deviations of a pulse; one in 1600 signals of tails, bursts and slow noise"
+    )
+    event_apart_s: float = convention(0.1, "rough rows that are nearer to each other are one event")
+    command_share: float = convention(
+        0.1, "of the largest commanded jerk: from here on a signal may be rough in step with it"
+    )
+    command_lasts_s: float = physics(
+        0.15, "after a jerk, a reversal or a jump of the force until servo and arm are calm"
+    )
+    in_step_p: float = convention(
+        0.01, "chance that so many events fall where the command, or another table, changes"
+    )
+    in_step_least: int = convention(3, "events by which the command tells: two are a coincidence")
+    change_level_s: float = convention(0.4, "before and after an event, over which its level is the median")
+    change_deviations: float = convention(
+        8.0, "robust deviations of that level elsewhere in the run, beyond which a change stays"
+    )
+    same_place_s: float = convention(0.05, "repeats and tables show one event within this")
     hum_least_rows: int = convention(500, "fewer rows tell no line of a spectrum from its surroundings")
     hum_wander_hz: float = physics(0.1, "a grid keeps its frequency to 20 mHz, its fifth multiple to 0.1")
     hum_around_hz: float = convention(2.0, "beside a line of the mains the level of the noise is looked for")
@@ -109,6 +135,12 @@ class BesideThresholds:
     path_still_mm: float = convention(1e-3, "samples that go no further are at rest")
 
     fine_step_s: float = physics(0.004, "cycle of a KRC4 under RSI; a blended corner lasts some 5 ms")
+    corner_step_s: float = physics(
+        0.001, "at 0.2 m/s and 60 m/s2 across a corner of 0.5 mm samples 4 ms apart miss 0.1 mm, these 0.01"
+    )
+    corner_near_mm: float = convention(
+        0.3, "a path that comes by twice passes a corner equally near to within this"
+    )
     fine_same_mm: float = convention(
         0.05, "planned anew, a prediction's samples are met to this, or its laws are others"
     )

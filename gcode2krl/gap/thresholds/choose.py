@@ -79,12 +79,14 @@ class ChooseThresholds:
     modelled_freedom: float = convention(
         10.0, "degrees of freedom that the scatter by the noise's model has beside that between stretches"
     )
-    significant_share: float = calibrated(
-        0.1, DEVELOPMENT, "excess power below this share of the noise's is within what its model is sure of"
-    )
     least_spread: float = convention(
         0.1, "of the mean over the root of the count: the least standard deviation of a mean square"
     )
+    model_off: float = convention(
+        2.0,
+        "times the accuracy of a model without noise: a moment that is further off is a gap, however short",
+    )
+    model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
     observable_share: float = convention(
         0.02, "an effect whose power nuisance leaves less of is not observable in that link"
     )
@@ -103,6 +105,10 @@ class ChooseThresholds:
     bent_rival_share: float = calibrated(
         0.7, DEVELOPMENT, "the same of a rival that is not proportional to its size"
     )
+    twin_share: float = convention(
+        0.8, "of what an effect does while it is small: a candidate that does as much then is refitted"
+    )
+    most_twins: int = convention(3, "of those that are refitted beside an effect, the nearest first")
     rival_gain: float = calibrated(15.0, DEVELOPMENT, "a rival within this gain of the cause is refitted")
     least_unknown: float = convention(0.02, "no probability is nearer to 0 or 1: nothing is certain")
 

@@ -29,14 +29,19 @@ class FamilyThresholds:
     significant_p: float = convention(0.01, "a family explains some of the rest from this p on")
     least_evidence: float = convention(4.6, "log 100: less evidence, over its inflation, is none")
 
-    gap_p: float = convention(0.005, "the least p that the flips can tell: a gap whatever its size")
+    gap_p: float = convention(
+        1e-3, "of the best family by the distribution of the largest over flips: five links, one run in 200"
+    )
     gap_evidence: float = calibrated(
         23.0, DEVELOPMENT, "log 1e10, over the inflation: tones at 1.3 times the noise have 60 and more"
     )
-    gap_power: float = calibrated(
-        0.02,
-        DEVELOPMENT,
-        "of the noise: sound links have families of up to 80 nats, but of less than a hundredth of its power",
+
+    certain_evidence: float = calibrated(
+        200.0, DEVELOPMENT, "nats over the inflation whatever the flips: in few stretches sound links have 80"
+    )
+
+    form_error: float = convention(
+        0.01, "of its amplitude: no form of an effect, and no robot, is known better; less is no gap"
     )
 
     # Names
@@ -67,6 +72,13 @@ class FamilyThresholds:
         DEVELOPMENT,
         "of its evidence: a family that contains another is told before it from so much more on; beside a "
         "right mastering of A1 a smooth function was ahead of a constant by 0.0003",
+    )
+
+    time_ahead_share: float = calibrated(
+        0.1,
+        DEVELOPMENT,
+        "the same of what each run has over time, which fits any input of a slow motion: smooth loops of a "
+        "torque were behind it by 0.05",
     )
 
     # The answer

@@ -21,8 +21,13 @@ class FitThresholds:
     )
     noise_least_stated: float = convention(0.9, "of what run.toml states: noise is never taken to be less")
     noise_most_stated: float = convention(
-        2.5,
-        "times what run.toml states: a data sheet states the best; heavy tails of twice that come beside it",
+        1.4,
+        "times what run.toml states: a data sheet states the best; more than that is a finding, not noise",
+    )
+
+    poses_least_again: int = convention(8, "readings of poses visited again from which they tell the noise")
+    poses_chance: float = convention(
+        0.01, "that one of all signatures explains so much of too few poses by chance: then it is no noise"
     )
 
     noise_most_lines: int = convention(8, "tones of one signal that are taken off before its noise is learnt")

@@ -66,9 +66,6 @@ class SlipThresholds:
     )
     stop_hold_steps: int = convention(4, "steps in which the time of standing is found")
     stop_hold_settled_s: float = convention(1e-3, "a smaller step ends them")
-    corner_near_mm: float = convention(
-        0.3, "a path that comes by twice passes a corner equally near to within this"
-    )
 
     program_on_share: float = calibrated(
         0.1, WITH_ONCE_SCORED, "share of its way that an edited program keeps to the predicted curve"

@@ -36,6 +36,9 @@ class TellThresholds:
         0.5, "a phase with less of the gap's power is not in the first sentence"
     )
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
+    worst_run: float = convention(
+        1.25, "a run whose gap is this many times that of all runs is named; nearer sizes are told as one"
+    )
     headline_causes: int = convention(3, "causes in the first sentence")
     headline_numbers: int = convention(4, "a cause with more numbers is without them in the first sentence")
     phase_over_rest: float = convention(
@@ -52,4 +55,14 @@ class TellThresholds:
         2.0, "standard deviations of a mean at a reference point: less is told as nothing"
     )
     parted_odds: float = convention(3.0, "expected odds below which a program is said to part nothing")
+    impulse_probability: float = convention(
+        0.95, "of an impulse that no noise makes, that it is what happened at its place"
+    )
+    same_moment_s: float = convention(
+        0.2, "an impulse and a step that are nearer to each other are one event"
+    )
+    course_points: int = convention(7, "points at most of how a deviation goes over its input")
+    most_bursts: int = convention(3, "bursts of one run whose moments a finding lists")
+    same_reading: float = convention(1.05, "two readings of a noise that are nearer to each other are one")
+    coarse_steps: float = convention(2.0, "times the noise: readings in such steps are a finding")
     minutes_from_s: float = convention(100.0, "times from here on are told in minutes")

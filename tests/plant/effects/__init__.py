@@ -2,10 +2,14 @@
 
 from tests.plant.effects import (
     body,
+    drives,
+    events,
+    filters,
     forces,
     joints,
     open,
     readings,
+    shaking,
     slips,
     steps,
     structure,

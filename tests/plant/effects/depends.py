@@ -18,6 +18,7 @@ ON = (
     "own_torque_memory",
     "velocity",
     "acceleration",
+    "jerk",
     "force",
     "force_memory",
     "force_by_place",

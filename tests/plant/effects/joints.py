@@ -12,12 +12,13 @@ STILL_rad_s = 2e-5
 
 @declare(LIBRARY, "joint", 0.001, 0.05)
 def backlash(draw: Draw):
-    name, j = draw.joint()
+    name, axes = draw.axes()
     start = draw.uniform(-1.0, 1.0)
 
     def at(size):
         def gear(run: Run):
-            run.q_load[:, j] += slack(run.q_act[:, j], size, start)
+            for j in axes:
+                run.q_load[:, j] += slack(run.q_act[:, j], size, start)
 
         return numbers(gap_deg=size), {"gear": gear}
 

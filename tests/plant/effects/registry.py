@@ -9,6 +9,8 @@ from tests.plant.effects.depends import LIBRARY_DEPENDS, Depends
 from tests.plant.robot import Hooks
 from tests.plant.scene import JOINTS
 
+ALL = "all"
+"""Target of what errs alike in all six joints."""
 At = Callable[[float], tuple[dict, Hooks]]  # size -> parameters, hooks
 
 
@@ -25,6 +27,7 @@ class Kind:
     hours: bool = False  # shows only between runs that are hours apart
     all_runs: bool = False  # sized on all runs, and twice: begins late, or is not linear in its size
     depends: Depends | Callable[[str | None], Depends] | None = None  # or by the target
+    moments: bool = False  # shows in moments, which the label lists
     others: list = field(default_factory=list)
     others_depend: dict = field(default_factory=dict)
 
@@ -52,13 +55,14 @@ def declare(
     hours=False,
     all_runs=False,
     depends: Depends | Callable[[str | None], Depends] | None = None,
+    moments=False,
 ):
     """Put a builder on a shelf under its own name; sizes from `low` to `high` are plausible."""
 
     def keep(build):
         name = build.__name__
         shelf[name] = Kind(
-            name, family, (low, high), signal, frozenset(needs), build, hours, all_runs, depends
+            name, family, (low, high), signal, frozenset(needs), build, hours, all_runs, depends, moments
         )
         return build
 
@@ -95,6 +99,13 @@ class Draw:
         """Name and index of a joint."""
         name = self.target(JOINTS)
         return name, JOINTS.index(name)
+
+    def axes(self) -> tuple[str, list[int]]:
+        """Name and indices of a joint; of all six where "all" is wanted, which is never drawn."""
+        if self.wanted == ALL:
+            return ALL, list(range(6))
+        name, j = self.joint()
+        return name, [j]
 
     def uniform(self, low: float, high: float) -> float:
         """Between low and high."""

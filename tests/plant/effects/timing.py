@@ -157,11 +157,11 @@ def advance_crawl(draw: Draw):
 
 @declare(LIBRARY, "servo", 0.001, 0.03)
 def servo_lag(draw: Draw):
-    name, j = draw.joint()
+    name, axes = draw.axes()
 
     def at(size):
         def lags(run: Run):
-            run.lag_s[:, j] += size
+            run.lag_s[:, axes] += size
 
         return numbers(tau_s=size), {"lags": lags}
 

@@ -15,7 +15,7 @@ from gcode2krl.gap.tell.html.path_svg import Strip, View, points, scale_colours,
 from gcode2krl.gap.tell.html.pictures import largest_size, picture_bytes, run_figure
 from gcode2krl.gap.tell.report import left_lines, where_words, worst
 from gcode2krl.gap.tell.result import CauseResult, Gap
-from gcode2krl.gap.tell.words import alike, describe, kind, named, next_run, number
+from gcode2krl.gap.tell.words import alike, depends, describe, happened, kind, named, next_run, number
 from gcode2krl.report.page.one_file import base_css
 from gcode2krl.version import __version__
 
@@ -61,7 +61,9 @@ def page(gap: Gap) -> str:
             colours=scale_colours(),
             largest=0.0 if evidence is None else largest_size(evidence),
             causes=[_cause(cause) for cause in gap.causes],
+            events=[happened(each) for each in gap.events],
             left=list(left_lines(gap)),
+            courses=[(depends(each), each.course) for each in gap.unexplained.depends_on if each.course],
             next_run=[] if gap.next_run is None else next_run(gap.next_run),
             version=__version__,
             base_css=base_css(),

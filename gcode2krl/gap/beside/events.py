@@ -1,0 +1,418 @@
+"""Events: what is rough or far off for a moment, and whose it is before anything is left out.
+
+An encoder does not burst in step with the command, nor at the same places in every run, nor together with
+the tracker, and it leaves nothing behind. So what is rough is compared with where the command changes (jerk,
+reversals, jumps of the predicted force), with repeats of the program, with the other tables and with the
+level before and after it:
+
+- in step with the command, or at the same place in all repeats: structure, and it
+  stays.
+- with a change that stays behind it: something slipped, which is told. It stays where it is
+  that change alone.
+- a pulse (`pulses`), or rough in two tables at once: an impulse of the machine. Its rows are a model of their
+  own, so the rest is judged without them; it is told with moment, size and width, and is a gap.
+- else the instrument's: a burst. It is left out, and that is told.
+
+"In step" is a binomial test: of k events at least so many fall into a share f of the time by chance.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+
+from gcode2krl.arrays import Bools, Floats
+from gcode2krl.effects import Inputs
+from gcode2krl.gap.beside.admissible import Admissible
+from gcode2krl.gap.beside.bursts import loud_rows
+from gcode2krl.gap.beside.decimals import resolution, usual_deviation
+from gcode2krl.gap.beside.holdout import with_rows
+from gcode2krl.gap.beside.interpolation import linear
+from gcode2krl.gap.beside.pulses import pulse_rows
+from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.beside
+_JERK_STEP_S = 0.012
+"""Over which the commanded acceleration is differenced: a cycle of the interpolator."""
+_LEVELS = 200
+"""Places of a run at which the level before and after is compared."""
+_OUTLIER_ROWS = 2
+"""So few rows that are no pulse are an outlier, which needs no moment."""
+_LEAST_ROWS = 60
+_MOST_FITTED = 4000
+"""Rows of a run from which is learnt what follows the motion; the time that takes does not grow with it."""
+_MOMENT_S = 0.1
+"""Over which changes of the rest are compared with those of the motion."""
+_FAR, _RIDGE = 6.0, 1e-6
+"""Robust deviations beyond which a row does not tell what follows the motion; columns of unit mean square."""
+_SAME_MM = 1e-3
+"""Repeats of a program have the same path."""
+
+Span = tuple[float, float]
+"""Start and end in s of the table's stamps."""
+
+
+class Whose(Enum):
+    """What an event is."""
+
+    COMMAND = "in step with the command"
+    SLIP = "a change that stays"
+    IMPULSE = "an impulse"
+    INSTRUMENT = "a burst of the instrument"
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """One event of one run in one link's signal, in the link's inner unit."""
+
+    link: str
+    run: str
+    whose: Whose
+    span_s: Span
+    at_s: float
+    """Where it is largest; of a slip where the level has changed by half."""
+    line: int
+    """Of the G-code that the robot is on; 0 where it is on none."""
+    peak: Floats
+    """(k,) the largest deviation from the level around it."""
+    change: Floats
+    """(k,) by how much the level is another one behind it."""
+    power: float
+    """Sum of the squares of its deviations over its rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Rough rows of a trace that belong together."""
+
+    first: int
+    last: int
+    is_pulse: bool
+
+
+def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]]) -> list[Trace]:
+    """Return traces of all runs with their events, less the rows of impulses and of instruments' bursts.
+
+    ``elsewhere``: of each run the times at which other tables are rough (`rough_spans`).
+    """
+    rests = [_rest(trace) for trace in traces]
+    stretches = [list(_stretches(trace, rest)) for trace, rest in zip(traces, rests, strict=True)]
+    if not any(stretches):
+        return list(traces)
+    commanded = _in_step(traces, stretches, [_command_changes(trace) for trace in traces])
+    repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
+    shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
+    coincident = _in_step(traces, stretches, shared, least=1)
+    return [
+        _sorted(_Levels(trace, rest), own, [a or b for a, b in zip(command, again, strict=True)], both)
+        for trace, rest, own, command, again, both in zip(
+            traces, rests, stretches, commanded, repeated, coincident, strict=True
+        )
+    ]
+
+
+def line_at(inputs: Inputs, at_s: float) -> int:
+    """Return the G-code line that the robot is on at a time of its run."""
+    row = min(max(int(np.searchsorted(inputs.time_s, at_s)) - 1, 0), len(inputs) - 1)
+    return int(inputs.source_line[row])
+
+
+def rough_spans(traces: Sequence[Trace]) -> dict[str, list[Span]]:
+    """Return of each run the times at which a signal is rough or in a pulse, outliers apart."""
+    spans: dict[str, list[Span]] = {}
+    for trace in traces:
+        kept = [each for each in _stretches(trace, _rest(trace)) if not _is_outlier(each)]
+        spans.setdefault(trace.run, []).extend(_span(trace, each) for each in kept)
+    return spans
+
+
+# What is rough
+
+
+def _is_asked(trace: Trace) -> bool:
+    """Tell whether a trace has events: what is commanded has no instrument, and poses have no time."""
+    return trace.link.has_instrument and not trace.still and len(trace.time_s) >= _LEAST_ROWS
+
+
+def _rest(trace: Trace) -> Floats:
+    """Return what is left (n, k) of a trace beside all that follows its motion and its force.
+
+    A clock that is off, a lag or a play make pulses and steps, too: in step with the command, whatever else.
+    """
+    if not _is_asked(trace):
+        return trace.residual
+    inputs, rest = Admissible(trace), trace.residual.copy()
+    shared = np.column_stack(
+        [
+            *(inputs.position_mm, inputs.q_rad, inputs.rate_rad_s, inputs.acceleration_rad_s2),
+            *(inputs.velocity_mm_s, inputs.acceleration_mm_s2, inputs.directions, inputs.force_N),
+        ]
+    )
+    # by what changes within moments: a step of the rest is then a few rows that are far off
+    now = np.arange(0, len(rest), max(1, len(rest) // _MOST_FITTED))
+    later = np.minimum(np.searchsorted(trace.time_s, trace.time_s[now] + _MOMENT_S), len(rest) - 1)
+    for j, column in enumerate(trace.columns):
+        own = inputs.tool_axes[:, column % 3]
+        if trace.link.of_tip:
+            own = inputs.jacobian[:, column] * inputs.directions
+        columns = np.column_stack([shared, own])
+        changes = columns[later] - columns[now]
+        scale = np.sqrt(np.mean(changes**2, axis=0))
+        used = scale > 1e-9 * np.maximum(np.abs(columns).max(axis=0), 1e-12)
+        weights = _fitted(changes[:, used] / scale[used], rest[later, j] - rest[now, j])
+        rest[:, j] -= columns[:, used] @ (weights / scale[used])
+    return rest
+
+
+def _fitted(columns: Floats, values: Floats) -> Floats:
+    """Return the weights (c,) of columns for values (n,), those far off what they give left out."""
+    weights: Floats = np.zeros(columns.shape[1])
+    for _ in range(2):
+        off = values - columns @ weights - np.median(values - columns @ weights)
+        near = np.abs(off) <= _FAR * max(usual_deviation(off), 1e-12)
+        x = columns[near]
+        gram = x.T @ x + _RIDGE * len(x) * np.eye(x.shape[1])
+        weights = np.asarray(np.linalg.solve(gram, x.T @ values[near]), dtype=np.float64)
+    return weights
+
+
+def _stretches(trace: Trace, rest: Floats) -> Iterator[_Stretch]:
+    """Yield the rough stretches of a trace whose rest (n, k) is this."""
+    if not _is_asked(trace):
+        return
+    least = np.array([resolution(column) for column in trace.measured.T])
+    pulsed = pulse_rows(trace.time_s, rest, trace.segments, least) & ~_is_edge(trace, rest)
+    rough = pulsed | loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
+    rows = np.flatnonzero(rough)
+    if not len(rows):
+        return
+    breaks = np.flatnonzero(np.diff(trace.time_s[rows]) > _LIMITS.event_apart_s) + 1
+    for part in np.split(rows, breaks):
+        first, last = int(part[0]), int(part[-1]) + 1
+        yield _Stretch(first, last, bool(pulsed[first:last].any()))
+
+
+def _is_edge(trace: Trace, rest: Floats) -> Bools:
+    """Return the rows (n,) of a force that is off by less than its model changes there: an edge."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    if trace.link.of_joints or trace.link.of_tip:
+        return np.zeros(len(rest), dtype=np.bool_)
+    around = 2 * int(_MOMENT_S / float(np.median(np.diff(trace.time_s)))) + 1
+    reach = maximum_filter1d(trace.nominal, around, axis=0) - minimum_filter1d(trace.nominal, around, axis=0)
+    edge: Bools = np.linalg.norm(rest, axis=1) < np.linalg.norm(reach, axis=1)
+    return edge
+
+
+def _is_outlier(stretch: _Stretch) -> bool:
+    return not stretch.is_pulse and stretch.last - stretch.first <= _OUTLIER_ROWS
+
+
+def _span(trace: Trace, stretch: _Stretch) -> Span:
+    return float(trace.time_s[stretch.first]), float(trace.time_s[stretch.last - 1])
+
+
+# What it is in step with
+
+
+def _in_step(
+    traces: Sequence[Trace],
+    stretches: Sequence[Sequence[_Stretch]],
+    chosen: Sequence[Bools],
+    least: int = _LIMITS.in_step_least,
+) -> list[list[bool]]:
+    """Return which stretches of each trace fall into chosen rows (n,); none where that may be chance."""
+    from scipy.special import bdtrc
+
+    inside = [
+        [bool(rows[each.first : each.last].any()) for each in own]
+        for own, rows in zip(stretches, chosen, strict=True)
+    ]
+    events = [not _is_outlier(each) for own in stretches for each in own]
+    counted = sum(a and b for a, b in zip(events, [each for own in inside for each in own], strict=True))
+    share = float(np.mean(np.concatenate(list(chosen))))
+    chance = bdtrc(counted - 1, sum(events), share) if counted else 1.0
+    if counted >= least and chance < _LIMITS.in_step_p:
+        return inside
+    return [[False] * len(own) for own in stretches]
+
+
+def _command_changes(trace: Trace) -> Bools:
+    """Return the rows (n,) shortly after the command jerks, a joint turns back or the force jumps."""
+    inputs = trace.inputs
+    time_s = inputs.time_s
+    if len(time_s) < 5:
+        return np.zeros(len(trace.time_s), dtype=np.bool_)
+    rate = np.gradient(inputs.q_cmd_rad, time_s, axis=0)
+    acceleration = np.gradient(rate, time_s, axis=0)
+    later = time_s + _JERK_STEP_S
+    jerk = np.abs(
+        np.stack([np.interp(later, time_s, each) for each in acceleration.T], axis=1) - acceleration
+    )
+    largest = np.maximum(jerk.max(axis=0), 1e-12)
+    changes = (jerk / largest > _LIMITS.command_share).any(axis=1)
+    moving = np.abs(rate) > 1e-3 * np.maximum(np.abs(rate).max(axis=0), 1e-12)
+    changes[1:] |= ((np.sign(rate[1:]) * np.sign(rate[:-1]) < 0.0) & moving[1:]).any(axis=1)
+    force = inputs.force_base_N
+    most_N = float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    if most_N > 0.0:
+        next_N = np.stack([np.interp(time_s + _LIMITS.jump_s, time_s, each) for each in force.T], axis=1)
+        changes |= np.linalg.norm(next_N - force, axis=1) > _LIMITS.jump_share * most_N
+    at_s = time_s[changes]
+    after = trace.time_s[:, None] if len(at_s) == 0 else trace.time_s - _last_before(at_s, trace.time_s)
+    before = np.interp(trace.time_s + _LIMITS.same_place_s, time_s, changes.astype(np.float64)) > 0.0
+    near: Bools = before | (after < _LIMITS.command_lasts_s) if len(at_s) else before
+    return near
+
+
+def _last_before(at_s: Floats, time_s: Floats) -> Floats:
+    """Return the last of some moments before each time (n,); minus infinity where there is none."""
+    number = np.searchsorted(at_s, time_s, side="right")
+    last: Floats = np.append(-np.inf, at_s)[number]
+    return last
+
+
+def _repeated(
+    traces: Sequence[Trace],
+    rests: Sequence[Floats],
+    stretches: Sequence[Sequence[_Stretch]],
+    number: int,
+) -> list[bool]:
+    """Return which stretches of a trace every other run of the same program has too, at the same time.
+
+    Rough ones where the others are rough; pulses also where the others do the same, too small to be pulses.
+    """
+    trace = traces[number]
+    repeats = [i for i, other in enumerate(traces) if i != number and _is_repeat(trace, other)]
+    if not repeats:
+        return [False] * len(stretches[number])
+    others = [
+        _at(trace, [_span(traces[i], each) for each in stretches[i] if not _is_outlier(each)])
+        for i in repeats
+    ]
+    everywhere = np.all(others, axis=0)
+    # where all are rough most of the time that says nothing
+    if float(np.mean(everywhere)) > _LIMITS.bursts_most:
+        everywhere[:] = False
+    again = [linear(trace.time_s, traces[i].time_s, rests[i]) for i in repeats]
+    return [
+        not _is_outlier(each)
+        and (bool(everywhere[each.first : each.last].any()) or _is_in_all(each, rests[number], again))
+        for each in stretches[number]
+    ]
+
+
+def _is_in_all(stretch: _Stretch, rest: Floats, again: Sequence[Floats]) -> bool:
+    """Tell whether a pulse of a rest (n, k) is in all other ones (n, k) by half of its height at least."""
+    if not stretch.is_pulse:
+        return False
+    # between the rows before and behind it, so that a level of each run's own says nothing
+    rows = np.arange(max(stretch.first - 1, 0), min(stretch.last + 1, len(rest)))
+    share = np.linspace(0.0, 1.0, len(rows))[:, None]
+    own, *others = (
+        values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (rest, *again)
+    )
+    return all(float(np.sum(own * each)) > 0.5 * float(np.sum(own**2)) for each in others)
+
+
+def _is_repeat(one: Trace, other: Trace) -> bool:
+    a, b = one.inputs, other.inputs
+    same = len(a) == len(b) and one.run != other.run
+    return same and bool(np.allclose(a.position_mm, b.position_mm, atol=_SAME_MM))
+
+
+def _at(trace: Trace, spans: Sequence[Span]) -> Bools:
+    """Return the rows (n,) of a trace within some times, or near them."""
+    rows = np.zeros(len(trace.time_s), dtype=np.bool_)
+    for start_s, end_s in spans:
+        first, last = np.searchsorted(
+            trace.time_s, [start_s - _LIMITS.same_place_s, end_s + _LIMITS.same_place_s]
+        )
+        rows[first:last] = True
+    return rows
+
+
+# Whose it is
+
+
+def _sorted(
+    levels: "_Levels", stretches: Sequence[_Stretch], stays: Sequence[bool], coincident: Sequence[bool]
+) -> Trace:
+    trace = levels.trace
+    events, out, outliers = [], np.zeros(len(trace.time_s), dtype=np.bool_), 0
+    for stretch, in_step, in_both in zip(stretches, stays, coincident, strict=True):
+        rows = slice(stretch.first, stretch.last)
+        if in_step:
+            continue
+        if _is_outlier(stretch):
+            out[rows], outliers = True, outliers + stretch.last - stretch.first
+            continue
+        change, has_changed = levels.change(stretch)
+        whose = Whose.IMPULSE if stretch.is_pulse or in_both else Whose.INSTRUMENT
+        whose = Whose.SLIP if has_changed else whose
+        event = levels.event(stretch, whose, change)
+        # a slip that is no more than its change is what a step's moment is fitted to
+        out[rows] = whose is not Whose.SLIP or np.linalg.norm(event.peak) > np.linalg.norm(change)
+        events.append(event)
+    if not events and not out.any():
+        return trace
+    told = [f"{outliers} of {len(out)} rows: outliers of the instrument"] if outliers else []
+    return replace(
+        with_rows(trace, ~out),
+        events=(*trace.events, *events),
+        left_out=(*trace.left_out, *told),
+    )
+
+
+class _Levels:
+    """The level of a trace's rest before and after its stretches."""
+
+    def __init__(self, trace: Trace, rest: Floats) -> None:
+        self.trace, self._rest = trace, rest
+
+    def event(self, stretch: _Stretch, whose: Whose, change: Floats) -> Event:
+        """Return the event of a stretch."""
+        time_s = self.trace.time_s[stretch.first : stretch.last]
+        around = 0.5 * (self._level(stretch.first, -1) + self._level(stretch.last, 1))
+        off = self._rest[stretch.first : stretch.last] - around
+        squares = np.sum(off**2, axis=1)
+        middle_s = float(squares @ time_s) / max(float(squares.sum()), 1e-300)
+        at_s = middle_s if whose is Whose.IMPULSE else float(time_s[0] + time_s[-1]) / 2.0
+        return Event(
+            link=self.trace.link.name,
+            run=self.trace.run,
+            whose=whose,
+            span_s=(float(time_s[0]), float(time_s[-1])),
+            at_s=at_s,
+            line=line_at(self.trace.inputs, at_s),
+            peak=off[int(np.argmax(squares))],
+            change=change,
+            power=float(squares.sum()),
+        )
+
+    def change(self, stretch: _Stretch) -> tuple[Floats, bool]:
+        """Return by how much the level (k,) changes over a stretch, and whether that stays."""
+        change = self._level(stretch.last, 1) - self._level(stretch.first, -1)
+        return change, bool(np.any(np.abs(change) > _LIMITS.change_deviations * self._usual))
+
+    @cached_property
+    def _usual(self) -> Floats:
+        """(k,) robust deviation of the change of the level, anywhere in the run."""
+        count = len(self._rest)
+        rows = range(count // _LEVELS, count - count // _LEVELS, max(1, count // _LEVELS))
+        changes = np.stack([self._level(row + 1, 1) - self._level(row, -1) for row in rows])
+        return np.array([usual_deviation(each - np.median(each)) for each in changes.T])
+
+    def _level(self, row: int, way: int) -> Floats:
+        """Return the median (k,) of the rows after (1) or before (-1) a row."""
+        time_s = self.trace.time_s
+        row = min(max(row, 0), len(time_s) - 1)
+        end = int(np.searchsorted(time_s, time_s[row] + way * _LIMITS.change_level_s))
+        rows = (
+            self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
+        )
+        level: Floats = np.median(rows, axis=0)
+        return level

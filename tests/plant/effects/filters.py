@@ -1,0 +1,94 @@
+"""What an instrument does to its reading: it smooths, hangs behind, or counts in coarse steps."""
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from tests.plant import memory
+from tests.plant.effects.depends import force as force_
+from tests.plant.effects.depends import tip as tip_
+from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.robot import Run, STEP_s
+
+SMOOTHED = tip_("smooth", "velocity", "acceleration")
+
+
+@declare(LIBRARY, "sensor", 0.001, 0.3, signal="tcp", all_runs=True, depends=SMOOTHED)
+def tracker_filter(draw: Draw):
+    """The tracker smooths its places by a first-order filter of `size` seconds."""
+
+    def at(size):
+        def tip(run: Run):
+            tau = np.full(len(run.t_s), size)
+            run.tip_mm = np.stack(
+                [memory.lag(run.tip_mm[:, k].copy(), tau, STEP_s) for k in range(3)], axis=1
+            )
+
+        return numbers(tau_s=size), {"tip": tip}
+
+    return None, at
+
+
+@other_form("tracker_filter")
+def tracker_average(draw: Draw):
+    """A moving average over the last `size` times two."""
+
+    def at(size):
+        def tip(run: Run):
+            width = max(1, round(2.0 * size / STEP_s))
+            late = uniform_filter1d(run.tip_mm, width, axis=0, mode="nearest", origin=(width - 1) // 2)
+            run.tip_mm = late if width > 1 else run.tip_mm
+
+        return numbers(tau_s=size, window_s=2.0 * size), {"tip": tip}
+
+    return None, at
+
+
+FULL_N = 300.0
+HELD = force_("loop", "force_memory", "force")
+
+
+@declare(LIBRARY, "sensor", 1e-5, 1.0, signal="force", needs=("cut",), all_runs=True, depends=HELD)
+def force_hysteresis(draw: Draw):
+    """The reading hangs behind by `size` times 300 N: a play of the force on each axis of the sensor."""
+
+    def at(size):
+        def sense(run: Run):
+            half = np.full(len(run.slow_s), size * FULL_N)
+            for k in range(3):
+                run.sensed_N[:, k] = memory.play(run.sensed_N[:, k].copy(), half, 0.0)
+
+        return numbers(share=size, half_N=size * FULL_N), {"sense": sense}
+
+    return None, at
+
+
+@other_form("force_hysteresis")
+def force_hysteresis_of_bouc_wen(draw: Draw):
+    """A smooth loop over 300 N."""
+    sharp = draw.uniform(2.0, 5.0)
+
+    def at(size):
+        def sense(run: Run):
+            for k in range(3):
+                run.sensed_N[:, k] -= (
+                    size * FULL_N * memory.bouc_wen(run.sensed_N[:, k].copy(), FULL_N, sharp)
+                )
+
+        return numbers(share=size, sharpness=sharp), {"sense": sense}
+
+    return None, at
+
+
+@declare(
+    LIBRARY, "sensor", 0.5, 150.0, signal="force", all_runs=True, depends=force_("smooth", "force", "noise")
+)
+def force_steps(draw: Draw):
+    """The reading comes in a ladder of `size` newtons: a range that is far too wide."""
+
+    def at(size):
+        def sense(run: Run):
+            run.sensed_N = size * np.round(run.sensed_N / size)
+
+        return numbers(step_N=size), {"sense": sense}
+
+    return None, at
