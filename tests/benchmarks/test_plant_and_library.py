@@ -24,7 +24,7 @@ SIZE = 0.02
 PROGRAM, HOURS, STEP_s = "pocket", 2.0, 0.02
 MODELLED_s = 0.004
 """A log of 12 ms is modelled this finely by the diagnosis."""
-LEAST = {"tcp": 2e-3, "force": 0.3, "servo": 1e-5, "gear": 1e-5, "part": 2e-3}
+LEAST = {"tcp": 2e-3, "force": 0.3, "motor": 1e-5, "servo": 1e-5, "gear": 1e-5, "part": 2e-3}
 """Changes of a smaller RMS in mm, N and degrees are not compared."""
 NUMBERS_DECIDE = {"advance_stop": 0.85, "friction": 0.85, "tool_diameter": 0.85, "vibration": 0.95}
 """Cosine to the other where more than a formula decides: which corners, samples of 12 ms, the last chips."""
@@ -92,7 +92,7 @@ def of_plant(run, grid):
     )
     part = np.stack([np.interp(grid, run.slow_s, run.part_mm[:, k]) for k in range(3)], axis=1)
     tip, force = columns("tracker", ("x_mm", "y_mm", "z_mm")), columns("force", ("fx_N", "fy_N", "fz_N"))
-    return {"tcp": tip, "force": force, "servo": act - cmd, "gear": load - act, "part": part}
+    return {"tcp": tip, "force": force, "motor": act, "servo": act - cmd, "gear": load - act, "part": part}
 
 
 def of_library(inputs, effects, grid):
@@ -103,7 +103,7 @@ def of_library(inputs, effects, grid):
     if shift is not None:
         part = np.stack([np.interp(grid, inputs.time_s, column) for column in shift.T], axis=1)
     tip, force = signals.seen("tcp_base_mm", grid), signals.seen("force_meas_base_N", grid)
-    return {"tcp": tip, "force": force, "servo": act - cmd, "gear": load - act, "part": part}
+    return {"tcp": tip, "force": force, "motor": act, "servo": act - cmd, "gear": load - act, "part": part}
 
 
 @pytest.mark.slow
