@@ -21,9 +21,13 @@ SPELT_OUT = {
 """Vector of a label -> its elements in the library."""
 RENAMED = {"kg": "mass_kg"}
 CONVERTED: dict[str, dict[str, tuple[tuple[str, ...], float]]] = {
+    "bolt_ratchet": {"mm": (("step_mm",), 1.0), "hold_N": (("threshold_N",), 1.0)},
     "cutter_bending": {"mm_per_kN": (("um_per_N",), 1.0)},
+    "dead_time": {"dead_time_s": (("delay_s",), 1.0)},
     "encoder_interpolation": {"lines": (("periods",), 1.0)},
     "fixture_compliance": {"mm_per_kN": (("x_um_per_N", "y_um_per_N", "z_um_per_N"), 1.0)},
+    "floor_vibration": {"mm": (("amplitude_mm",), 1.0)},
+    "jerk_feed_forward": {"s3": (("per_jerk_s3",), -1.0)},
     "spindle_growth": {"mm": (("um_per_krpm",), 1000.0 / (PLANT_RPM / 1000.0))},
     "tracker_refraction": {
         "mm_at_2m": (("K_per_m",), 1.0 / BENT_mm_m_K),

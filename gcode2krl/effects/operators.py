@@ -26,7 +26,7 @@ def play(values: Floats, half_width: float) -> Floats:
 
 
 def lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
-    """Return tau·y' + y = x for (m,), from rest; exact for an input whose slope is linear between samples.
+    """Return tau·y' + y = x for (m,), from rest; exact for an input that is a cubic between samples.
 
     Slopes are central differences; with those of single intervals a lag of a tenth of the step would come out
     half a step late.

@@ -26,6 +26,13 @@ static double slope_at(Floats values, Floats time_s, int64_t i) {
     return slope;
 }
 
+/* Return what a lag keeps of a rise 6·u·(1 - u) in a step u = 0 ... 1 of a time constants. */
+static double of_bulge(double a) {
+    if (a < 0.05) /* the closed form cancels there */
+        return 1.0 - a * (0.5 - a * (0.15 - a / 30.0));
+    return 6.0 * (a - 2.0 + (a + 2.0) * exp(-a)) / (a * a * a);
+}
+
 /* Write tau·y' + y = x for values (m), from rest. */
 EXPORT void effects_lag(Floats values, Floats time_s, double tau_s, Floats out) {
     double behind = 0.0, slope = 0.0; /* y - x, x' */
@@ -36,6 +43,8 @@ EXPORT void effects_lag(Floats values, Floats time_s, double tau_s, Floats out) 
             const double kept = exp(-dt / tau_s);
             const double gone = tau_s * (1.0 - kept);
             behind = behind * kept - before * gone - (slope - before) * (tau_s - tau_s * gone / dt);
+            /* so that the slopes add up to the rise: else what changes from sample to sample goes through */
+            behind -= (AT(values, i) - AT(values, i - 1) - dt * (slope + before) / 2.0) * of_bulge(dt / tau_s);
         }
         AT(out, i) = AT(values, i) + behind;
     }

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
 
 from gcode2krl.effects.operators import lag, play, second_order, since_reversal
 
@@ -54,6 +55,23 @@ def test_lag_of_a_sine_has_its_gain_and_phase():
     settled = T > 1.0
     wanted = np.sin(w * T - np.arctan(w * tau)) / np.hypot(1.0, w * tau)
     np.testing.assert_allclose(lag(np.sin(w * T), T, tau)[settled], wanted[settled], atol=1e-3)
+
+
+@pytest.mark.parametrize("tau", [0.0002, 0.003, 0.02, 0.3])
+def test_lag_of_what_changes_from_sample_to_sample(tau):
+    """Against steps a thousandth as long through the cubic of the samples and their central differences."""
+    x = np.random.default_rng(5).normal(size=60)
+    t = 0.004 * np.arange(len(x))
+    fine_s = np.linspace(0.0, t[-1], 1000 * (len(x) - 1) + 1)
+    slopes = np.gradient(x, t)
+    slopes[0] = 2.0 * slopes[0] - slopes[1]  # as a parabola begins
+    fine = CubicHermiteSpline(t, x, slopes)(fine_s)
+    kept = np.exp(-(fine_s[1] - fine_s[0]) / tau)
+    follows, y = [x[0]], x[0]
+    for before, after in itertools.pairwise(fine):
+        y = kept * y + (1.0 - kept) * (before + after) / 2.0
+        follows.append(y)
+    np.testing.assert_allclose(lag(x, t, tau), follows[::1000], atol=2e-3)
 
 
 @pytest.mark.parametrize(("hz", "damping"), [(7.0, 0.03), (25.0, 0.01), (12.0, 0.3)])

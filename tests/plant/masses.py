@@ -47,14 +47,19 @@ def pulls(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 def joint_moments(run: Run) -> np.ndarray:
     """Moments about the six joints by weight and inertia, the controller's sign, N·mm, (n, 6)."""
-    body, (place, pull) = run.body(), pulls(run)
-    q = np.ascontiguousarray(run.q_act[::SLOW])
-    out = np.zeros((len(q), 6))
+    (place, pull), (seats, axes) = pulls(run), hinges(run)
+    out = np.zeros((len(place), 6))
     for j in range(6):
-        seat, axis = _axis(body, q, j)
         for k in range(j, place.shape[1]):
-            out[:, j] += np.sum(np.cross(place[:, k] - seat, pull[:, k]) * axis, axis=1)
+            out[:, j] += np.sum(np.cross(place[:, k] - seats[:, j], pull[:, k]) * axes[:, j], axis=1)
     return out
+
+
+def hinges(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """A point of each joint's axis and its direction in the root, (n, 6, 3) each; the controller's sign."""
+    body, q = run.body(), np.ascontiguousarray(run.q_act[::SLOW])
+    seats, axes = zip(*(_axis(body, q, j) for j in range(6)), strict=True)
+    return np.stack(seats, axis=1), np.stack(axes, axis=1)
 
 
 def _axis(body: arms.Arm, q_rad: np.ndarray, j: int) -> tuple[np.ndarray, np.ndarray]:

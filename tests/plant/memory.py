@@ -152,20 +152,6 @@ def limited(x, most, hz, dt_s):
 
 
 @njit(cache=True, nogil=True)
-def dahl(x, soft):
-    """Wind-up in -1 ... 1 by travel: dw = (sign(dx) - w)·|dx|/soft, exactly over each step."""
-    out = np.zeros_like(x)
-    w = 0.0
-    for i in range(1, len(x)):
-        d = x[i] - x[i - 1]
-        if d != 0.0:
-            side = 1.0 if d > 0.0 else -1.0
-            w = side + (w - side) * np.exp(-abs(d) / soft)
-        out[i] = w
-    return out
-
-
-@njit(cache=True, nogil=True)
 def ratchet(load, hold):
     """Steps taken: one each time that a load comes above `hold`, and none back."""
     out = np.zeros_like(load)
@@ -173,6 +159,6 @@ def ratchet(load, hold):
     for i in range(len(load)):
         if load[i] > hold and not above:
             count += 1.0
-        above = load[i] > 0.8 * hold if above else load[i] > hold
+        above = load[i] > 0.9 * hold if above else load[i] > hold
         out[i] = count
     return out

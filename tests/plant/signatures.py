@@ -31,7 +31,6 @@ GRIDS: dict[str, dict[int, tuple[float, ...]]] = {  # effect -> number of the qu
     "vibration": {1: (0.08, 0.25, 0.42, 0.58, 0.75, 0.92)},
     "nonlinear_stiffness": {0: (0.2, 0.8)},
     "belt_wind_up": {0: (0.1, 0.5, 0.9)},
-    "spindle_droop": {0: (0.2, 0.8)},
     "current_limit": {0: (0.5,)},
 }
 FACTORS = {  # sizes to start at, in units of the middle one, of effects that are not linear in their size
@@ -52,7 +51,7 @@ FACTORS = {  # sizes to start at, in units of the middle one, of effects that ar
 SQUARED = ("vibration",)  # a direction counts twice: drive and answer lie along it
 EVENTS = {"step": "step", "collision": "impulse", "bolt_ratchet": "step"}
 """Begin at a moment of a run, which is looked for in what mismatch leaves of a case: started case by case."""
-TONES = ("floor_vibration", "bearing_wobble")  # their first share is a frequency, looked for as well
+TONES = ("floor_vibration",)  # its first share is a frequency, looked for as well
 MOST_SHARE = 0.5
 UNSEEN = ("scan",)  # signals that no column has
 

@@ -1,4 +1,4 @@
-"""What a drive does to its command, in one joint or in all six alike: late, scaled, ahead in jerk, too weak.
+"""What a drive does to its command, in one joint or in all six alike: late, loose, ahead in jerk, too weak.
 
 Six servos with synchronised gains err alike: target `all`. Then the tip moves on its path but late, or on a
 path a little beside it.
@@ -6,11 +6,11 @@ path a little beside it.
 
 import numpy as np
 
-from tests.plant import memory
+from tests.plant import masses, memory
 from tests.plant.effects.depends import joint as joint_
 from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
-from tests.plant.robot import Run, STEP_s
-from tests.plant.scene import DEGREE
+from tests.plant.robot import SLOW, Run, STEP_s, fast, joint_torques
+from tests.plant.scene import DEGREE, JOINTS
 
 SERVO = ("servo",)
 
@@ -38,25 +38,61 @@ def dead_time(draw: Draw):
     return name, at
 
 
-@declare(
-    LIBRARY,
-    "servo",
-    2e-5,
-    0.03,
-    signal="joint_actual",
-    all_runs=True,
-    depends=joint_("smooth", "own_angle", "travel", links=SERVO),
-)
-def servo_gain(draw: Draw):
-    """The drive goes `size` times too far, counted from the run's start: a wrong scale of its encoder."""
+@other_form("dead_time")
+def dead_time_of_two_clocks(draw: Draw):
+    """The bus and the drive count their own cycles: the delay grows by up to its mean, then skips a cycle."""
     name, axes = draw.axes()
-    sign = draw.sign()
+    skips_hz, begins = draw.log_uniform(0.05, 0.5), draw.uniform(0.0, 1.0)
 
     def at(size):
         def servo(run: Run):
-            run.q_act[:, axes] += sign * size * (run.q_act[:, axes] - run.q_act[0, axes])
+            late_s = size * (0.5 + np.mod(run.t_s * skips_hz + begins, 1.0))
+            for j in axes:
+                run.q_act[:, j] = np.interp(run.t_s - late_s, run.t_s, run.q_act[:, j])
 
-        return numbers(gain=1.0 + sign * size), {"servo": servo}
+        return numbers(dead_time_s=size, skips_hz=skips_hz), {"servo": servo}
+
+    return name, at
+
+
+LOOP = joint_("smooth", "velocity", "acceleration", links=SERVO)
+
+
+@declare(LIBRARY, "servo", 0.01, 0.5, signal="joint_actual", all_runs=True, depends=LOOP)
+def servo_gain(draw: Draw):
+    """A position loop, 15 to 60 1/s, to which `size` of the speed is not fed forward, or that much too much.
+
+    q' = k_v·(command - q) + (1 - missing)·command': the error is the missing share of the loop's whole lag.
+    """
+    name, axes = draw.axes()
+    sign, k_v = draw.sign(), draw.log_uniform(15.0, 60.0)
+
+    def at(size):
+        def servo(run: Run):
+            tau = np.full(len(run.t_s), 1.0 / k_v)
+            for j in axes:
+                command = run.q_act[:, j].copy()
+                run.q_act[:, j] += sign * size * (memory.lag(command, tau, STEP_s) - command)
+
+        return numbers(missing_share=sign * size, k_v_per_s=k_v), {"servo": servo}
+
+    return name, at
+
+
+@other_form("servo_gain")
+def servo_gain_over_a_slow_speed_loop(draw: Draw):
+    """The speed loop inside is only two to six times as fast: the error swings in, e''/w + e' + k_v·e = v."""
+    name, axes = draw.axes()
+    sign, k_v, faster = draw.sign(), draw.log_uniform(15.0, 60.0), draw.uniform(2.0, 6.0)
+    hz, damping = k_v * np.sqrt(faster) / (2.0 * np.pi), 0.5 * np.sqrt(faster)
+
+    def at(size):
+        def servo(run: Run):
+            for j in axes:
+                speed = run.rates(run.q_act[:, j]).copy()
+                run.q_act[:, j] -= sign * size / k_v * memory.second_order(speed, hz, damping, STEP_s)
+
+        return numbers(missing_share=sign * size, k_v_per_s=k_v, faster=faster), {"servo": servo}
 
     return name, at
 
@@ -64,20 +100,43 @@ def servo_gain(draw: Draw):
 JERK = joint_("smooth", "jerk", "acceleration", links=SERVO)
 
 
+def _jerk(run: Run, j: int) -> np.ndarray:
+    return run.rates(run.rates(run.rates(run.q_cmd[:, j])))
+
+
 @declare(LIBRARY, "servo", 1e-9, 1e-2, signal="joint_actual", all_runs=True, depends=JERK, moments=True)
 def jerk_feed_forward(draw: Draw):
-    """Without (or with too much) feed-forward of jerk the error is `size` s³ times the commanded jerk."""
+    """Without (or with too much) feed-forward of jerk a drive is behind by `size` s³ times the jerk.
+
+    Its speed and torque loops take `settle_s` each to answer.
+    """
     name, axes = draw.axes()
-    sign = draw.sign()
+    sign, settle_s = draw.sign(), draw.log_uniform(0.004, 0.02)
+
+    def at(size):
+        def servo(run: Run):
+            tau = np.full(len(run.t_s), settle_s)
+            for j in axes:
+                smooth = memory.lag(memory.lag(_jerk(run, j), tau, STEP_s), tau, STEP_s)
+                run.q_act[:, j] -= sign * size * smooth
+
+        return numbers(s3=sign * size, settle_s=settle_s), {"servo": servo}
+
+    return name, at
+
+
+@other_form("jerk_feed_forward")
+def jerk_feed_forward_that_rings(draw: Draw):
+    """A drive train of 15 to 40 Hz swings at each jump of the acceleration."""
+    name, axes = draw.axes()
+    sign, hz, damping = draw.sign(), draw.uniform(15.0, 40.0), draw.uniform(0.15, 0.5)
 
     def at(size):
         def servo(run: Run):
             for j in axes:
-                jerk = run.rates(run.rates(run.rates(run.q_cmd[:, j])))
-                smooth = memory.lag(jerk, np.full(len(jerk), 0.002), STEP_s)
-                run.q_act[:, j] -= sign * size * smooth
+                run.q_act[:, j] -= sign * size * memory.second_order(_jerk(run, j), hz, damping, STEP_s)
 
-        return numbers(s3=sign * size), {"servo": servo}
+        return numbers(s3=sign * size, hz=hz, damping=damping), {"servo": servo}
 
     return name, at
 
@@ -106,25 +165,37 @@ def current_limit(draw: Draw):
     return name, at
 
 
-WOUND = joint_("loop", "reversals", "own_torque_memory", "travel")
+WOUND = joint_("smooth", "own_torque_memory", "own_torque", "force")
+BELTS = ("A4", "A5", "A6")
 
 
-@declare(LIBRARY, "joint", 1e-5, 0.1, signal="any", all_runs=True, depends=WOUND)
-def belt_wind_up(draw: Draw):
-    """A belt behind the motor winds up by `size` degrees over the first travel after each reversal.
-
-    dw = (sign(v) - w)·|dq|/soft, Dahl's friction on an elastic belt: smooth where a play has a flank.
-    """
-    name, j = draw.joint()
-    soft = draw.log_uniform(0.002, 0.03)
+def _creeping(draw: Draw, slower: tuple[float, ...]):
+    """Creep of a belt under the joint's torque, in equal parts with these multiples of one time."""
+    name = draw.target(BELTS)
+    j, relax_s = JOINTS.index(name), draw.log_uniform(1.0, 40.0)
 
     def at(size):
-        def gear(run: Run):
-            run.q_load[:, j] -= size * DEGREE * memory.dahl(run.q_act[:, j].copy(), soft)
+        def load(run: Run):  # the torque is known after the cut
+            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
+            taus = [np.full(len(torque), relax_s * times) for times in slower]
+            crept = np.mean([memory.lag(torque, tau, SLOW * STEP_s) for tau in taus], axis=0)
+            run.q_load[:, j] += size * DEGREE / 1e6 * fast(run, crept[:, None])[:, 0]
 
-        return numbers(deg=size, soft_rad=soft), {"gear": gear}
+        return numbers(deg_per_kNm=size, relax_s=relax_s), {"load": load}
 
     return name, at
+
+
+@declare(LIBRARY, "joint", 1e-3, 10.0, signal="any", needs=("cut",), all_runs=True, depends=WOUND)
+def belt_wind_up(draw: Draw):
+    """The belt of a wrist axis creeps by `size` degrees per kN·m of the joint's torque, with one time."""
+    return _creeping(draw, (1.0,))
+
+
+@other_form("belt_wind_up")
+def belt_wind_up_of_two_times(draw: Draw):
+    """Rubber and cord: half of it creeps within a fifth of the time of the other half."""
+    return _creeping(draw, (0.4, 2.0))
 
 
 @declare(
@@ -137,12 +208,15 @@ def belt_wind_up(draw: Draw):
     depends=joint_("smooth", "own_angle", "place", "constant"),
 )
 def axis_coupling(draw: Draw):
-    """A3 is driven along by A2 a little: a parallel link of the wrong length. `size` degrees per degree."""
+    """A3 is driven along by A2 a little: a parallel link of the wrong length. `size` degrees per degree.
+
+    Counted from A2's zero, where its link lies level; what that leaves constant is a matter of A3's zero.
+    """
     sign = draw.sign()
 
     def at(size):
         def gear(run: Run):
-            run.q_load[:, 2] += sign * size * (run.q_act[:, 1] + np.pi / 2.0)
+            run.q_load[:, 2] += sign * size * run.q_act[:, 1]
 
         return numbers(ratio=sign * size), {"gear": gear}
 
@@ -156,7 +230,7 @@ def axis_coupling_of_a_crank(draw: Draw):
 
     def at(size):
         def gear(run: Run):
-            run.q_load[:, 2] += sign * size * 2.0 * np.sin(0.5 * (run.q_act[:, 1] + np.pi / 2.0) + phase)
+            run.q_load[:, 2] += sign * size * 2.0 * np.sin(0.5 * run.q_act[:, 1] + phase)
 
         return numbers(ratio=sign * size, phase=phase), {"gear": gear}
 

@@ -57,10 +57,23 @@ def collision_without_a_slip(draw: Draw):
 LOOSE = tip_("step", "force", "force_memory", "time_step", "own_torque_memory")
 
 
-def _held(run: Run, share: float) -> np.ndarray:
-    """Steps so far, at the fast samples: the load over a share of the largest that these programs reach."""
+def _slips(run: Run, hold_N: float) -> np.ndarray:
+    """Slips so far, at the fast samples: one each time that the load comes above what the bolt holds."""
     press = np.linalg.norm(run.force_N, axis=1)
-    return np.floor(fast(run, memory.ratchet(press, share * 300.0)[:, None])[:, 0] + 1e-9)
+    return np.floor(fast(run, memory.ratchet(press, hold_N)[:, None])[:, 0] + 1e-9)
+
+
+def _ratcheting(draw: Draw, way_of):
+    """The tip after so many slips; `way_of(count)` in units of the first."""
+    target, hold_N, way = draw.target(("tip",)), draw.uniform(90.0, 210.0), draw.direction()
+
+    def at(size):
+        def tip(run: Run) -> None:
+            run.tip_mm = run.tip_mm + size * way_of(_slips(run, hold_N))[:, None] * way
+
+        return numbers(mm=size, hold_N=hold_N, direction=way), {"tip": tip}
+
+    return target, at
 
 
 @declare(
@@ -68,12 +81,10 @@ def _held(run: Run, share: float) -> np.ndarray:
 )
 def bolt_ratchet(draw: Draw):
     """A loose bolt gives `size` mm each time that the force exceeds a level; each run starts tightened."""
-    hold, way = draw.uniform(0.3, 0.7), draw.direction()
+    return _ratcheting(draw, lambda count: count)
 
-    def at(size):
-        def tip(run: Run) -> None:
-            run.tip_mm = run.tip_mm + size * _held(run, hold)[:, None] * way
 
-        return numbers(mm=size, hold_N=300.0 * hold, direction=way), {"tip": tip}
-
-    return None, at
+@other_form("bolt_ratchet")
+def bolt_ratchet_that_seats(draw: Draw):
+    """Each slip is a fifth shorter than the one before: the joint beds in."""
+    return _ratcheting(draw, lambda count: (1.0 - 0.8**count) / 0.2)

@@ -47,17 +47,36 @@ FULL_N = 300.0
 HELD = force_("loop", "force_memory", "force")
 
 
-@declare(LIBRARY, "sensor", 1e-5, 1.0, signal="force", needs=("cut",), all_runs=True, depends=HELD)
+@declare(LIBRARY, "sensor", 1e-4, 0.3, signal="force", needs=("cut",), all_runs=True, depends=HELD)
 def force_hysteresis(draw: Draw):
-    """The reading hangs behind by `size` times 300 N: a play of the force on each axis of the sensor."""
+    """A loop over each axis of the sensor, `size` of the largest force of the run wide (Masing's rule).
+
+    The reading lacks that share of what a play of half the largest force does not follow.
+    """
 
     def at(size):
         def sense(run: Run):
-            half = np.full(len(run.slow_s), size * FULL_N)
+            for k in range(3):
+                force = np.append(0.0, run.sensed_N[:, k])  # from rest without a load
+                half = np.full(len(force), 0.5 * np.abs(force).max())
+                run.sensed_N[:, k] -= size * (force - memory.play(force, half, 0.0))[1:]
+
+        return numbers(loss_percent=100.0 * size), {"sense": sense}
+
+    return None, at
+
+
+@other_form("force_hysteresis")
+def force_hysteresis_of_a_rubbing_mount(draw: Draw):
+    """The mount rubs with a force of its own, whatever the load: a plain play of the reading."""
+
+    def at(size):
+        def sense(run: Run):
+            half = np.full(len(run.slow_s), 0.5 * size * FULL_N)
             for k in range(3):
                 run.sensed_N[:, k] = memory.play(run.sensed_N[:, k].copy(), half, 0.0)
 
-        return numbers(share=size, half_N=size * FULL_N), {"sense": sense}
+        return numbers(loss_percent=100.0 * size, half_N=0.5 * size * FULL_N), {"sense": sense}
 
     return None, at
 
@@ -74,7 +93,7 @@ def force_hysteresis_of_bouc_wen(draw: Draw):
                     size * FULL_N * memory.bouc_wen(run.sensed_N[:, k].copy(), FULL_N, sharp)
                 )
 
-        return numbers(share=size, sharpness=sharp), {"sense": sense}
+        return numbers(loss_percent=100.0 * size, sharpness=sharp), {"sense": sense}
 
     return None, at
 
