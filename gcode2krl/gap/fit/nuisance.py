@@ -18,6 +18,12 @@ from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of
 
 NO_JOINTS: Mapping[str, frozenset[str]] = MappingProxyType({})
 
+_BENT = 0.5 / 3.0**0.5
+"""Of 2·f(B/2) - f(B), a standard deviation. With u = size/B a signal of second order is u·f(B) and 2·u·(1 - u)
+of that column, at most a half of it."""
+_STRAIGHT = 1e-6
+"""Of f(B): less is rounding."""
+
 
 class Nuisance(NamedTuple):
     """Columns (k, n, c), already times their standard deviation."""
@@ -95,14 +101,23 @@ def _of_block(block: Block, trace: Trace, mismatch: Mismatch, known: Signatures)
             continue
         # at the size that it may have: a lag of 15 ms has another shape than one of half a millisecond
         size = abs(bound / typical)
-        columns = known.columns(block, trace, size)
-        width = columns.shape[2] // len(sizes)
-        own = columns[:, :, number * width : (number + 1) * width]
+        whole = _of_size(known.columns(block, trace, size), number, len(sizes))
         words = (effect.name, target, *(f"{value:g}" for value in block.shape.values()))
         if len(sizes) > 1:
             words = (*words, p.name)
-        deviation = own * (sigma(bound) / (size * typical))
-        yield Nuisance(" ".join(filter(None, words)), True, deviation, block)
+        name = " ".join(filter(None, words))
+        yield Nuisance(name, True, whole * (sigma(bound) / bound), block)
+        if p.low == p.nominal:
+            half = _of_size(known.columns(block, trace, size / 2.0), number, len(sizes))
+            bent = 2.0 * half - whole
+            if np.abs(bent).max(initial=0.0) > _STRAIGHT * np.abs(whole).max(initial=0.0):
+                yield Nuisance(f"{name}, bent", True, bent * _BENT, block)
+
+
+def _of_size(columns: Floats, number: int, count: int) -> Floats:
+    """Return the columns (k, n, c) of one of so many sizes."""
+    width = columns.shape[2] // count
+    return columns[:, :, number * width : (number + 1) * width]
 
 
 # Instruments, each run its own value

@@ -10,7 +10,14 @@ from gcode2krl.effects import Applied, Inputs, Signals, drives
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.clocks import with_table_clock
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.instruments import CLOCK, ENCODER_ZERO, ROUGH, constants
+from gcode2krl.gap.beside.instruments import (
+    CLOCK,
+    ENCODER_ZERO,
+    PLAY_START,
+    ROUGH,
+    constants,
+    play_start_columns,
+)
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.traces import joint_trace
@@ -162,8 +169,9 @@ class GearLink(_DriveLink):
         )
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
-        """Yield the zeros of the encoders, which are set by hand."""
+        """Yield the zeros of the encoders, which are set by hand, and where in their play the joints begin."""
         yield ENCODER_ZERO, constants(trace) * mismatch.joint_zero_rad * ROUGH
+        yield PLAY_START, play_start_columns(trace, mismatch)
 
 
 def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
