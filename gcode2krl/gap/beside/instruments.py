@@ -39,7 +39,10 @@ def component_columns(values: Floats) -> Floats:
 
 
 def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
-    """Return (k, n, k): where in its play each joint stands when the run begins, until it has been crossed."""
+    """Return (k, n, k): where in its play each joint stands when the run begins.
+
+    Until the play has been crossed once.
+    """
     inputs, half_rad = trace.inputs, mismatch.play_rad / 2.0
     rows = nearest_rows(inputs.time_s, trace.time_s)
     motor_rad = (inputs.q_cmd_rad if inputs.q_act_rad is None else inputs.q_act_rad)[rows]

@@ -116,13 +116,17 @@ class Rest:
         return self._nats_beyond_time(best) >= least
 
     def _nats_beyond_time(self, evidence: Evidence) -> float:
-        """Return its nats over the inflation, less those of time in the run, which is what slow noise follows."""
+        """Return its nats over the inflation, less those of time in the run, which slow noise follows.
+
+        And less those of one stretch of time: a function shows in others too.
+        """
         own_time = (
-            each.nats
+            max(each.nats, 0.0)
             for each in self.study.evidences
             if each.on is Dependence.RUN_TIME and each.place.component == evidence.place.component
         )
-        return (evidence.nats - max(0.0, *own_time, 0.0)) / evidence.inflation
+        of_others = evidence.nats - 0.5 * evidence.gain * evidence.in_one
+        return (of_others - max(own_time, default=0.0)) / evidence.inflation
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:

@@ -100,7 +100,7 @@ class View:
         return said, deviation
 
     def _said_beside(self, component: int) -> tuple[Floats, Floats]:
-        """Return the middle one (t + m,) of what the other components say, and its deviation; nan where few do.
+        """Return the middle one (t + m,) of what the others say, and its deviation; nan where few do.
 
         One with an effect of its own is outvoted. A lag of each joint's own, within its bounds, lets each say
         another clock: the middle one is as unsure as they are.

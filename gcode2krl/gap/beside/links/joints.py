@@ -150,7 +150,7 @@ class GearLink(_DriveLink):
     name = "gear"
     signal = "joint_load"
     needs = "controller.csv with q1_load_deg … (encoders behind the gear)"
-    own_clock = True
+    own_clock = "q_load"
     sets_clocks = True
     instrument = (CLOCK, ENCODER_ZERO)
 
@@ -169,7 +169,7 @@ class GearLink(_DriveLink):
         )
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
-        """Yield the zeros of the encoders, which are set by hand, and where in their play the joints begin."""
+        """Yield the zeros of the encoders, set by hand, and where in its play each joint begins."""
         yield ENCODER_ZERO, constants(trace) * mismatch.joint_zero_rad * ROUGH
         yield PLAY_START, play_start_columns(trace, mismatch)
 
