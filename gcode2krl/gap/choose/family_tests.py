@@ -118,14 +118,15 @@ class Rest:
     def _nats_beyond_time(self, evidence: Evidence) -> float:
         """Return its nats over the inflation, less those of time in the run, which slow noise follows.
 
-        And less those of one stretch of time: a function shows in others too.
+        And less those of one stretch of time: a function shows in others too, and only a step need not.
         """
         own_time = (
             max(each.nats, 0.0)
             for each in self.study.evidences
             if each.on is Dependence.RUN_TIME and each.place.component == evidence.place.component
         )
-        of_others = evidence.nats - 0.5 * evidence.gain * evidence.in_one
+        once = 0.0 if evidence.on is Dependence.RUN_TIME_STEP else evidence.in_one
+        of_others = evidence.nats - 0.5 * evidence.gain * once
         return (of_others - max(own_time, default=0.0)) / evidence.inflation
 
     @property
