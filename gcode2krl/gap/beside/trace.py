@@ -151,7 +151,7 @@ class Trace:
         if self.still:
             return np.zeros(self.shape)
         step = 1e-3
-        return (self._at(self._plain, self.time_s + step) - self._at(self._plain, self.time_s - step)) / (
+        return (self.at(self._plain, self.time_s + step) - self.at(self._plain, self.time_s - step)) / (
             2.0 * step
         )
 
@@ -177,7 +177,7 @@ class Trace:
 
     def late(self, by_s: float) -> Floats:
         """Return what the model says (n, k) of an instrument that states what was true some time before."""
-        return self._at(self._plain, self.time_s - by_s)
+        return self.at(self._plain, self.time_s - by_s)
 
     def as_stated(self, vectors: Floats, rows: Ints) -> Floats:
         """Return vectors (n, 3) along ``$BASE``, at these rows (n,) of the model, along the signal's axes."""
@@ -186,8 +186,8 @@ class Trace:
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
         if not applied:
-            return self._at(self._plain, self.time_s)
-        return self._at(self._simulated((*self.base, *applied)), self.time_s)
+            return self.at(self._plain, self.time_s)
+        return self.at(self._simulated((*self.base, *applied)), self.time_s)
 
     def model_error(self, applied: Sequence[Applied]) -> Floats:
         """Return by how much the model may be off (n, k) where it, not noise, is the limit.
@@ -207,7 +207,8 @@ class Trace:
     def _simulated(self, applied: tuple[Applied, ...]) -> Signals:
         return self.link.simulated(self, applied)
 
-    def _at(self, signals: Signals, stamps: Floats) -> Floats:
+    def at(self, signals: Signals, stamps: Floats) -> Floats:
+        """Return what the instrument would show (n, k) of simulated signals at its stamps (n,)."""
         times = signals.true_time(self.plus, stamps - self.plus_late_s)
         if self.minus is not None:
             # the inputs are this signal as it was stamped: a clock of its own shows in the other one

@@ -14,6 +14,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS
+from gcode2krl.gap.beside.timing import residual_by_place
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.families.evidence import Evidence
@@ -188,7 +189,7 @@ class LinkFamilies:
         return replace(self.rest, study=study)
 
     def _left(self, applied: Sequence[Applied]) -> list[Floats]:
-        return [trace.measured - trace.sample(applied) for trace in self._rows.traces]
+        return [residual_by_place(trace, applied) for trace in self._rows.traces]
 
     def _without(self, numbers: Sequence[int]) -> View:
         """Return the view with some accepted effects taken out of the model, the others where they are."""

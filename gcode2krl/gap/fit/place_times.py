@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.interpolation import values_of
+from gcode2krl.gap.beside.timing import gone
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.fitted import Numbers
 from gcode2krl.gap.fit.least_squares import Shortened, gauss_newton
@@ -74,21 +75,3 @@ class PlaceTimes:
 
 def _settled(before: float, after: float) -> bool:
     return after > _SETTLED_SHARE**2 * before
-
-
-def gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:
-    """Return times and how far the signal has gone by them; ways below ``least`` count once they add up."""
-    kept = _anchors(values, least) if least > 0.0 else slice(None)
-    time_s, values = time_s[kept], values[kept]
-    return time_s, np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
-
-
-def _anchors(values: Floats, least: float) -> Ints:
-    """Return the rows that are at least so far from the kept row before them."""
-    kept, last = [0], values[0]
-    for row in range(1, len(values)):
-        way = values[row] - last
-        if float(way @ way) >= least * least:
-            kept.append(row)
-            last = values[row]
-    return np.array(kept)

@@ -180,6 +180,9 @@ class BesideThresholds:
         0.05, DEVELOPMENT, "larger lateness is no matter of small corrections in time"
     )
     retime_rounds: int = convention(3, "rounds of such corrections")
+    same_path_share: float = convention(
+        0.5, "of the difference at the same time, the most at the same place of a run that is late"
+    )
     timing_slow: float = convention(
         0.05, "share of the rms rate below which a sample tells nothing about time"
     )
