@@ -29,6 +29,8 @@ class Mismatch:
     force_zero_N: float = 3.0
     diameter_mm: float = 0.03
     """Of a ground end mill (ISO 286 h9, 16 mm: 0.043 mm below its nominal diameter)."""
+    length_mm: float = 0.1
+    """Of a tool that is touched off at the robot (assumed; a presetter is ten times better)."""
     k_s: float = 0.004
     acc_m_s2: float = 0.1
     """What 2 ms in the time law are worth in its constants."""

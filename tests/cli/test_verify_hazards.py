@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import ROOT
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 EXAMPLES = ROOT / "examples"
 SLOT = """G21 G90 G17 G40 G49 G80 G94 G54

@@ -41,7 +41,7 @@ def test_scores_are_those_of_the_projected_rows():
     weights = GENERATOR.standard_normal(5)
     left = view.projected - projected @ weights
     np.testing.assert_allclose(
-        found.scores_with(weights), view.members @ (projected * left[:, None]), atol=1e-9
+        found.scores_without(found.explained(weights)), view.members @ (projected * left[:, None]), atol=1e-9
     )
 
 

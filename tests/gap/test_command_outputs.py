@@ -11,7 +11,7 @@ from gcode2krl.cli.main import main
 from gcode2krl.gap.tell.result import Where
 from tests.gap.answered import GAP, STRETCH, evidence
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 FOUND = replace(GAP, where=Where(intervals=(STRETCH,)), evidence=evidence())
 

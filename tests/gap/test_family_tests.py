@@ -162,20 +162,28 @@ def test_evidence_within_its_inflation_counts_for_nothing():
 
 
 @pytest.mark.parametrize(
-    ("nats", "inflation", "tail_p", "known", "wanted"),
+    ("nats", "inflation", "tail_p", "known", "own_time", "in_one", "wanted"),
     [
-        (30.0, 1.0, 1e-6, 1e5, True),
-        (30.0, 2.0, 1e-6, 1e5, False),  # over its inflation it is not certain
-        (150.0, 1.0, 0.01, 1e5, False),  # few strong stretches of a sound link
-        (5000.0, 10.0, 0.01, 1e5, True),  # beyond all that models are off by
-        (30.0, 1.0, 1e-6, 1e6, False),  # less than a hundredth of what is known, in amplitude
-        (5000.0, 1.0, 1e-6, 2e8, False),
+        (30.0, 1.0, 1e-6, 1e5, 0.0, 0.0, True),
+        (30.0, 2.0, 1e-6, 1e5, 0.0, 0.0, False),  # over its inflation it is not certain
+        (150.0, 1.0, 0.01, 1e5, 0.0, 0.0, False),  # few strong stretches of a sound link
+        (5000.0, 10.0, 0.01, 1e5, 0.0, 0.0, True),  # beyond all that models are off by
+        (30.0, 1.0, 1e-6, 1e6, 0.0, 0.0, False),  # less than a hundredth of what is known, in amplitude
+        (5000.0, 1.0, 1e-6, 2e8, 0.0, 0.0, False),
+        (30.0, 1.0, 1e-6, 1e5, 20.0, 0.0, False),  # slow noise explains two thirds of it
+        (80.0, 1.0, 1e-6, 1e5, 20.0, 0.0, True),
+        (30.0, 1.0, 1e-6, 1e5, 60.0, 0.0, False),
+        (30.0, 1.0, 1e-6, 1e5, 0.0, 0.1, True),
+        (90.0, 1.0, 1e-6, 1e5, 0.0, 0.9, False),  # an event, no function
     ],
 )
 def test_a_gap_is_rare_or_beyond_what_models_are_off_by_however_small_beside_the_noise(
-    nats, inflation, tail_p, known, wanted
+    nats, inflation, tail_p, known, own_time, in_one, wanted
 ):
-    evidence = c.stub(nats=nats, inflation=inflation)
+    place = c.stub(component=None)
+    said = c.stub(nats=nats, gain=2.0 * nats, in_one=in_one, inflation=inflation, place=place)
+    evidence = c.stub(**vars(said), on=Dependence.VELOCITY)
+    slow = c.stub(nats=own_time, gain=0.0, in_one=0.0, inflation=1.0, on=Dependence.RUN_TIME, place=place)
     for gap_gain, upstream_gain in ((known, 0.0), (0.0, known)):
-        rest = Rest(Study(1e9, (evidence,), 0.005, tail_p), gap_gain, upstream_gain=upstream_gain)
+        rest = Rest(Study(1e9, (evidence, slow), 0.005, tail_p), gap_gain, upstream_gain=upstream_gain)
         assert rest.is_gap is wanted

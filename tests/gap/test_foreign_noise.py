@@ -9,7 +9,7 @@ from gcode2krl.gap.beside.events import sorted_out
 from gcode2krl.gap.choose.judgement import judge
 from tests.gap.constructed import LINK, Added, motion, question, trace, wave
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 COUNT, STEP_S, SIGMA = 750, 0.02, 1e-4
 """Runs of 15 s."""

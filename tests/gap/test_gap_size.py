@@ -11,7 +11,7 @@ from gcode2krl.gap.choose.gap_size import Size, size_of_gap
 from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, white
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 COUNT, SIGMA = 500, 0.5
 SIGNIFICANT_SIGMA = 4.0

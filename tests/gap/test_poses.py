@@ -14,7 +14,7 @@ from gcode2krl.gap.beside.poses import is_of_poses
 from gcode2krl.gap.fit.pose_noise import noise_of_poses, revisits
 from gcode2krl.runs import load_run
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 COVERS = ("gcode2krl.gap.fit.pose_noise",)
 

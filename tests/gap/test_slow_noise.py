@@ -6,7 +6,7 @@ import pytest
 from gcode2krl.gap.fit.noise import Slow, drawn_slow
 from gcode2krl.gap.fit.slow_noise import BlockMeans, slow_parts_of
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 STEP_S = 0.05
 COUNT, RUNS = 300, 3

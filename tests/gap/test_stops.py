@@ -9,7 +9,7 @@ from gcode2krl.gap.fit.place_times import gone
 from gcode2krl.gap.slips.stops import unplanned_stops
 from tests.gap.synthetic import applied, refined, runs
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 SERVO = {"tracker": False, "force": False}
 

@@ -1,10 +1,13 @@
 """A view of one component: what couples it with others is what these say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
 from gcode2krl.gap.families.view import View
+from gcode2krl.gap.fit.box import MOST
 
 COUNT = 300
 RATES = [np.sin(np.arange(COUNT) * (0.02 + 0.01 * joint)) for joint in range(6)]
@@ -27,13 +30,25 @@ def view(late, joints):
 
 def test_a_lag_of_one_joint_is_not_taken_for_the_clock_of_all():
     seen = view([1.0, 1.0, 9.0, 1.0, 1.0], 5).at(2)
-    assert seen.tangents.shape == (COUNT, 0)
     assert seen.residual @ RATES[2] / (RATES[2] @ RATES[2]) == pytest.approx(8.0, abs=0.1)
 
 
 def test_what_all_joints_say_is_the_clock():
     seen = view([3.0] * 5, 5).at(1)
     assert float(np.std(seen.projected)) == pytest.approx(0.1, rel=0.1)
+
+
+def test_joints_with_usual_lags_of_their_own_let_the_clock_be_unsure():
+    """Each of six says another clock; the third is late by a usual lag more than the middle one."""
+    sizes, usual = [0.9, 1.0, 3.0, 1.1, 1.2, 1.3], 2.0
+    plain = view(sizes, 6)
+    lags = np.zeros((6 * COUNT, 6))
+    for joint in range(6):
+        lags[joint * COUNT : (joint + 1) * COUNT, joint] = usual / MOST * RATES[joint]
+    seen = replace(
+        plain, nuisance=10.0 * lags, tangents=10.0 * plain.tangents, residual=10.0 * plain.residual
+    )
+    assert seen.at(2).chi2 == pytest.approx(COUNT, rel=0.15)
 
 
 def test_two_others_cannot_say_which_of_them_is_wrong():

@@ -82,6 +82,8 @@ def test_rows_have_the_line_that_made_them():
         ("o1 while [1] X5\no1 endwhile", ("expression", 3)),
         ("o1 if [1]\nX1", ("o-word", 3)),
         ("X1\no1 endif", ("o-word", 4)),
+        ("o1 if [1]\nX1\nZ5 (never closed", ("o-word", 3)),  # the missing end first
+        ("o1 if [1]\nX1\no1 endif (never closed", ("comment-open", 5)),
         ("o1 if [1]\no2 while [0]\no1 endif\no2 endwhile", ("o-word", 5)),
         ("o1 break", ("o-word", 3)),
         ("o1 foo", ("o-word", 3)),

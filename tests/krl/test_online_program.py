@@ -16,7 +16,7 @@ from tests.krl.test_pilot_program import predicted
 from tests.krl.test_verify import change, delete, errors, insert, motions_of, tampered
 from tests.krl.test_write import long_part
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 ADDRESS = {"online": {"link": {"address": "192.168.7.3"}}}
 HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54 G64 P0.02\nT1 M6\nS8000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\n"

@@ -14,7 +14,7 @@ from tests.krl.conftest import PART, read
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.replay import read_program
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 
 def part(data=None, text=PART, dt_s=0.012):

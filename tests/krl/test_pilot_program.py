@@ -16,7 +16,7 @@ from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.pilot_replay import breaks_of_blending, fire, halts_of, most_waiting
 from tests.krl.replay import read_program
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
 HEAD = "G21 G90 G17 G54 G64\nT1 M6\nS9000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\n"

@@ -6,7 +6,7 @@ import pytest
 
 from gcode2krl import verify_krl
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 HEAD = (
     "G21 G90 G17 G54 G64 P0.02\nT1 M6\nS8000 M3\n{coolant}"

@@ -11,7 +11,7 @@ from gcode2krl import load_cell, read_gcode, set_targets, solve_joints, write_kr
 from gcode2krl.cell import resolve_cell
 from tests.krl.replay import Kr300, frame, read_program, replay_joints
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
 THINNED = {"raster_finish": 10}

@@ -10,7 +10,7 @@ from gcode2krl.krl import write_krl
 from gcode2krl.pipeline import predict_toolpath
 from tests.krl.test_verify import ZIGZAG, errors
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 
 def check(made, src=None):

@@ -14,7 +14,7 @@ from gcode2krl.pilot import Knots, PilotHeader
 from tests.online.conftest import Log, talk
 from tests.online.krc import Krc
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 SIDE = np.array([0.0, 300.0, -50.0, 0.0, 0.0, 0.0])
 PROOF = 60

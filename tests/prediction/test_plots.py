@@ -13,7 +13,7 @@ from gcode2krl.prediction.plots import FIGURES, Plots
 from gcode2krl.report.drawing import look
 from tests.conftest import ROOT
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from tests.report.scenes import (
     toolpath_of,
 )
 
-pytestmark = pytest.mark.slow  # whole programs and diagnoses: minutes of the README's suite
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -38,6 +38,7 @@ class SwappedTool(Effect):
             nominal=0.0,
             start=2.0,
             role=Role.SIZE,
+            usual=lambda mismatch: mismatch.diameter_mm,
             source="the next tool of a rack: 1-10 mm",
         ),
         Parameter(
@@ -49,6 +50,7 @@ class SwappedTool(Effect):
             start=5.0,
             linear=True,
             role=Role.SIZE,
+            usual=lambda mismatch: mismatch.length_mm,
             source="another length of the same cutter: 5-100 mm",
         ),
     )

@@ -6,13 +6,14 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.effects.operators import play
 from gcode2krl.gap.beside.interpolation import nearest_rows
 
 if TYPE_CHECKING:
     from gcode2krl.gap.beside.trace import Trace
 
-CLOCK, ENCODER_ZERO = "table clock", "encoder zero"
-"""Names of two words, so that no effect can have such a name."""
+CLOCK, ENCODER_ZERO, PLAY_START = "table clock", "encoder zero", "start of play"
+"""Names of several words, so that no effect can have such a name."""
 ROUGH = 1e3
 """Standard deviation of a quantity that is never reported, however large, in units of its bound."""
 _KNOTS_S, _MOST_KNOTS = 1.0, 120
@@ -35,6 +36,19 @@ def component_columns(values: Floats) -> Floats:
     for j in range(k):
         columns[j, :, j] = values[:, j]
     return columns
+
+
+def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+    """Return (k, n, k): where in its play each joint stands when the run begins.
+
+    Until the play has been crossed once.
+    """
+    inputs, half_rad = trace.inputs, mismatch.play_rad / 2.0
+    rows = nearest_rows(inputs.time_s, trace.time_s)
+    motor_rad = (inputs.q_cmd_rad if inputs.q_act_rad is None else inputs.q_act_rad)[rows]
+    at_end = np.vstack([motor_rad[:1] + half_rad, motor_rad])
+    begun = [play(at_end[:, j], half_rad)[1:] - play(motor_rad[:, j], half_rad) for j in trace.columns]
+    return component_columns(np.nan_to_num(np.stack(begun, axis=1))) / 3.0**0.5
 
 
 def force_zero_columns(trace: "Trace") -> Floats:

@@ -44,8 +44,8 @@ class Signal:
     """RMS in the inner unit below which the run keeps to the planned times."""
     least_step: float = 0.0
     """Shorter ways along the signal, in the inner unit, are noise of the instrument, not motion."""
-    own_clock: bool = False
-    """The signal has a clock of its own besides that of its table."""
+    own_clock: str = ""
+    """The clock that the signal has of its own besides that of its table."""
     sets_clocks: bool = False
     """Clocks are set run by run first, since the signal changes fast all the time."""
     instrument: tuple[str, ...] = ()
@@ -61,6 +61,11 @@ class Signal:
     def planned(self, inputs: Inputs) -> Floats:
         """Return the planned signal (m, k) that shows how far a run has come."""
         raise NotImplementedError(f"{self.name} does not show how far a run has come")
+
+    @property
+    def clock(self) -> str:
+        """Return the name of the clock by which it may be late."""
+        return self.own_clock or self.table
 
     @property
     def has_instrument(self) -> bool:

@@ -106,16 +106,27 @@ class Rest:
     @property
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
-        best = max(self.study.evidences, key=net_gain, default=None)
+        best = max(self.study.evidences, key=self._nats_beyond_time, default=None)
         # of all that is known the form is known to a hundredth of its size, however long one looks at it
         if best is None or net_gain(best) < _LIMITS.form_error**2 * (self.gap_gain + self.upstream_gain):
             return False
-        is_rare = self.study.tail_p <= _LIMITS.gap_p
-        if is_rare and best.nats / best.inflation >= _LIMITS.gap_evidence:
-            return True
         # few strong stretches have few signs to flip; beyond all that models are off by, none are needed
-        most = max(each.nats / each.inflation for each in self.study.evidences)
-        return most >= _LIMITS.certain_evidence
+        is_rare = self.study.tail_p <= _LIMITS.gap_p
+        least = _LIMITS.gap_evidence if is_rare else _LIMITS.certain_evidence
+        return self._nats_beyond_time(best) >= least
+
+    def _nats_beyond_time(self, evidence: Evidence) -> float:
+        """Return its nats over the inflation, less those of time in the run, which slow noise follows.
+
+        And less those of one stretch of time: a function shows in others too.
+        """
+        own_time = (
+            max(each.nats, 0.0)
+            for each in self.study.evidences
+            if each.on is Dependence.RUN_TIME and each.place.component == evidence.place.component
+        )
+        of_others = evidence.nats - 0.5 * evidence.gain * evidence.in_one
+        return (of_others - max(own_time, default=0.0)) / evidence.inflation
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:

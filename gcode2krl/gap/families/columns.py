@@ -67,10 +67,14 @@ class Beside:
         )
         return scores
 
-    def scores_with(self, weights: Floats) -> Floats:
-        """Return White's scores (g, c) with P times weights (c,) taken off the residual."""
+    def explained(self, weights: Floats) -> Floats:
+        """Return P times weights (c,), (v,)."""
+        explained: Floats = self.columns.values @ weights - self.view.fixed @ (self.taken @ weights)
+        return explained
+
+    def scores_without(self, explained: Floats) -> Floats:
+        """Return White's scores (g, c) with what is explained (v,) taken off the residual."""
         view = self.view
-        explained = self.columns.values @ weights - view.fixed @ (self.taken @ weights)
         by_stretch = view.by_stretch(view.projected - explained)
         scores: Floats = by_stretch @ self.columns.values - (by_stretch @ view.fixed) @ self.taken
         return scores

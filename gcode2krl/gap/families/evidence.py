@@ -38,6 +38,8 @@ class Evidence:
     """(n, k) what it says of each trace; k = 1 where it is of one component alone."""
     at: tuple[int, float] | None = None
     """Run number and time of a step, or -1 and the frequency in Hz of a tone."""
+    in_one: float = 0.0
+    """Of its gain, the share of one stretch of time at most: a sample at a sharp corner may have it all."""
 
     @property
     def key(self) -> tuple[str, Dependence]:
@@ -85,7 +87,8 @@ def evidence_of(
         return None
     _, top, values, turned = best
     own_weights = turned.T @ score / (values + AMPLITUDES[top] ** -2)
-    left = beside.scores_with(turned @ own_weights) @ turned
+    explained = beside.explained(turned @ own_weights)
+    left = beside.scores_without(explained) @ turned
     fit = _bounded(beside, turned, values, top)
     inverse = np.diag(1.0 / (values + fit.amplitude**-2))
     return Evidence(
@@ -98,7 +101,14 @@ def evidence_of(
         unbounded=float(log_mean(np.array(owns))) - cost,
         signal=tuple((own @ (turned @ fit.weights)).T for own in raw),
         at=at,
+        in_one=_in_one(view, explained),
     )
+
+
+def _in_one(view: View, explained: Floats) -> float:
+    """Return the largest share of a stretch of time in the fall of chi2 by what is explained (v,)."""
+    falls = view.members @ (explained * (2.0 * view.projected - explained))
+    return float(np.clip(falls.max() / max(float(falls.sum()), 1e-30), 0.0, 1.0))
 
 
 class _Fit(NamedTuple):

@@ -16,6 +16,8 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 _PRIOR = THRESHOLDS.fit.prior_sizes**-2
 _LEAST_SAYING = 3
 """Components: fewer cannot outvote one that has an effect."""
+_MEDIAN_VARIANCE = float(np.pi / 2.0)
+"""Of a median of normal values, over that of their mean (Kenney & Keeping 1962)."""
 _KNOWN = 0.1
 """Of the variance before any data, the most that is left of what a component knows."""
 
@@ -54,12 +56,16 @@ class View:
         One joint alone would take an effect of its own, a lag, for the clock of all.
         """
         if component is not None and component not in self._of_component:
-            said = self._said_beside(component)
+            said, deviation = self._said_beside(component)
             known = self._used(component) & ~np.isnan(said)
             alone = self._of_rows(component, self._used(component) & ~known)
-            rows = self.components == component
-            moved = self.fixed[np.ix_(rows, known)] @ said[known]
-            self._of_component[component] = replace(alone, residual=alone.residual - moved)
+            columns = self.fixed[np.ix_(self.components == component, known)]
+            unsure = columns * (deviation[known] * _PRIOR**0.5)  # tangents have that wide prior
+            self._of_component[component] = replace(
+                alone,
+                residual=alone.residual - columns @ said[known],
+                tangents=np.concatenate([alone.tangents, unsure], axis=1),
+            )
         return self._of_component[component]
 
     def _used(self, component: int) -> Bools:
@@ -80,26 +86,32 @@ class View:
         )
 
     @cached_property
-    def _said(self) -> Floats:
-        """(k, t + m) what each component alone says of δ and b; nan of what it hardly knows."""
+    def _said(self) -> tuple[Floats, Floats]:
+        """(k, t + m) what each component alone says of δ and b, and how sure; nan of what it hardly knows."""
         said = np.full((int(self.components.max()) + 1, self.fixed.shape[1]), np.nan)
+        deviation = said.copy()
         for component in range(len(said)):
             used = self._used(component)
             alone = self._of_rows(component, used)
-            left = np.diag(alone.solved(np.diag(alone._precision)))  # of the variance before any data
-            said[component, used] = np.where(left < _KNOWN, alone.solved(alone.cross), np.nan)
-        return said
+            variance = np.diag(alone.solved(np.eye(int(used.sum()))))
+            is_known = variance * alone._precision < _KNOWN  # of the variance before any data
+            said[component, used] = np.where(is_known, alone.solved(alone.cross), np.nan)
+            deviation[component, used] = np.where(is_known, variance**0.5, np.nan)
+        return said, deviation
 
-    def _said_beside(self, component: int) -> Floats:
-        """Return the middle one (t + m,) of what the other components say; nan where few say anything.
+    def _said_beside(self, component: int) -> tuple[Floats, Floats]:
+        """Return the middle one (t + m,) of what the others say, and its deviation; nan where few do.
 
-        One with an effect of its own is outvoted.
+        One with an effect of its own is outvoted. A lag of each joint's own, within its bounds, lets each say
+        another clock: the middle one is as unsure as they are.
         """
-        said = np.delete(self._said, component, axis=0)
-        few = np.sum(~np.isnan(said), axis=0) < _LEAST_SAYING
-        middle = np.full(said.shape[1], np.nan)
-        middle[~few] = np.nanmedian(said[:, ~few], axis=0)
-        return middle
+        said, deviation = (np.delete(each, component, axis=0) for each in self._said)
+        count = np.sum(~np.isnan(said), axis=0)
+        many = count >= _LEAST_SAYING
+        middle, unsure = np.full(said.shape[1], np.nan), np.full(said.shape[1], np.nan)
+        middle[many] = np.nanmedian(said[:, many], axis=0)
+        unsure[many] = np.nanmedian(deviation[:, many], axis=0) * (_MEDIAN_VARIANCE / count[many]) ** 0.5
+        return middle, unsure
 
     @cached_property
     def fixed(self) -> Floats:

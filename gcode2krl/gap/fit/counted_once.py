@@ -11,7 +11,7 @@ directions b that imitate it are eigenvectors of Nᵀ·P·N·b = λ·(NᵀN + I)
 that is orthogonal to them stays. What they may add is allowed on top of the effect's own bound.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -30,6 +30,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from gcode2krl.gap.fit.design import Candidates, NuisanceDesign
     from gcode2krl.gap.fit.gram import SignatureGram
+    from gcode2krl.gap.fit.nuisance import Nuisance
 
 Key = tuple[str, str | None]
 """Name and target of an effect."""
@@ -90,17 +91,29 @@ class CountedOnce:
 
     def own_of(self, key: Key, counts: Mapping[str, float] = NO_COUNTS) -> Bools:
         """Return which coefficients (m,) are the usual size of an effect at its target, of some counts."""
-        own = np.zeros(self.design.width, dtype=np.bool_)
+
+        def is_own(item: "Nuisance") -> bool:
+            block = item.block
+            return (
+                block is not None
+                and block.key == key
+                and all(block.shape.get(name, value) == value for name, value in counts.items())
+            )
+
+        return self._where(is_own)
+
+    @property
+    def straight(self) -> Bools:
+        """(m,) all but what an effect does beyond the first order of its size."""
+        return ~self._where(lambda item: item.bent)
+
+    def _where(self, asked: "Callable[[Nuisance], bool]") -> Bools:
+        """Return which coefficients (m,) are of nuisance of which something is true."""
+        found = np.zeros(self.design.width, dtype=np.bool_)
         for items, places in zip(self.design.nuisance, self.design.places, strict=True):
-            first = 0
-            for each in items:
-                at = places[first : first + each.columns.shape[2]]
-                first += each.columns.shape[2]
-                block = each.block
-                if block is None or block.key != key:
-                    continue
-                own[at] |= all(block.shape.get(name, value) == value for name, value in counts.items())
-        return own
+            widths = [each.columns.shape[2] for each in items]
+            found[places] |= np.repeat([asked(each) for each in items], widths).astype(np.bool_)
+        return found
 
     def _projection(self, gone: Bools) -> Floats:
         """Return the projection (m, m): shared coefficients away, others less their mean over the runs."""
@@ -145,7 +158,7 @@ def once_among(
         block = candidates.block(column)
         alike[block.key] = alike.get(block.key, False) | _spanned(column.index, signatures, design)
         if column.width and block.key in bounded and block.key not in together:
-            others = ~once.own_of(block.key)
+            others = once.straight & ~once.own_of(block.key)
             directions, sizes = _imitating(column.index, signatures, design, others)
             if directions.shape[1]:
                 together[block.key], allowed[block.key] = directions, sizes

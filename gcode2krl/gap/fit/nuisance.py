@@ -18,6 +18,12 @@ from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of
 
 NO_JOINTS: Mapping[str, frozenset[str]] = MappingProxyType({})
 
+_BENT = 0.5 / 3.0**0.5
+"""Of 2·f(B/2) - f(B), a standard deviation: with u = size/B a signal of second order is u·f(B) and beside it
+2·u·(1 - u) of that column, at most a half."""
+_STRAIGHT = 1e-6
+"""Of f(B): less is rounding."""
+
 
 class Nuisance(NamedTuple):
     """Columns (k, n, c), already times their standard deviation."""
@@ -27,7 +33,9 @@ class Nuisance(NamedTuple):
     """One value for all runs, or one for each."""
     columns: Floats
     block: Block | None = None
-    """Of which effect, target and shape it is the usual size; None for an instrument."""
+    """Of which effect, target and shape it is the usual size; None for what only instruments have."""
+    bent: bool = False
+    """It is what the effect does beyond the first order of its size."""
 
 
 def nuisance_of(
@@ -46,7 +54,7 @@ def nuisance_of(
     """
     every = [
         *_of_effects(trace, library, mismatch, known, upstream, joints),
-        *_of_instruments(trace, mismatch, upstream, clock),
+        *_of_instruments(trace, library, mismatch, upstream, clock),
     ]
     return [nuisance for nuisance in every if np.any(nuisance.columns)]
 
@@ -95,24 +103,35 @@ def _of_block(block: Block, trace: Trace, mismatch: Mismatch, known: Signatures)
             continue
         # at the size that it may have: a lag of 15 ms has another shape than one of half a millisecond
         size = abs(bound / typical)
-        columns = known.columns(block, trace, size)
-        width = columns.shape[2] // len(sizes)
-        own = columns[:, :, number * width : (number + 1) * width]
+        whole = _of_size(known.columns(block, trace, size), number, len(sizes))
         words = (effect.name, target, *(f"{value:g}" for value in block.shape.values()))
         if len(sizes) > 1:
             words = (*words, p.name)
-        deviation = own * (sigma(bound) / (size * typical))
-        yield Nuisance(" ".join(filter(None, words)), True, deviation, block)
+        name = " ".join(filter(None, words))
+        yield Nuisance(name, True, whole * (sigma(bound) / bound), block)
+        if p.low == p.nominal:
+            half = _of_size(known.columns(block, trace, size / 2.0), number, len(sizes))
+            bent = 2.0 * half - whole
+            if np.abs(bent).max(initial=0.0) > _STRAIGHT * np.abs(whole).max(initial=0.0):
+                yield Nuisance(f"{name}, bent", True, bent * _BENT, block, bent=True)
+
+
+def _of_size(columns: Floats, number: int, count: int) -> Floats:
+    """Return the columns (k, n, c) of one of so many sizes."""
+    width = columns.shape[2] // count
+    return columns[:, :, number * width : (number + 1) * width]
 
 
 # Instruments, each run its own value
 
 
 def _of_instruments(
-    trace: Trace, mismatch: Mismatch, upstream: frozenset[str], clock: float
+    trace: Trace, library: Mapping[str, Effect], mismatch: Mismatch, upstream: frozenset[str], clock: float
 ) -> Iterator[Nuisance]:
     for name, columns in trace.link.mismatch(trace, mismatch):
         yield Nuisance(name, False, columns)
-    yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock)
+    effect = next((each for each in library.values() if each.is_clock), None)
+    block = None if effect is None else Block(effect, trace.link.clock)
+    yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock, block)
     if trace.link.has_time_law(upstream):
         yield Nuisance("time law", False, time_law_columns(trace, mismatch))

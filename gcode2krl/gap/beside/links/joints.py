@@ -10,7 +10,14 @@ from gcode2krl.effects import Applied, Inputs, Signals, drives
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.clocks import with_table_clock
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.instruments import CLOCK, ENCODER_ZERO, ROUGH, constants
+from gcode2krl.gap.beside.instruments import (
+    CLOCK,
+    ENCODER_ZERO,
+    PLAY_START,
+    ROUGH,
+    constants,
+    play_start_columns,
+)
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.traces import joint_trace
@@ -143,7 +150,7 @@ class GearLink(_DriveLink):
     name = "gear"
     signal = "joint_load"
     needs = "controller.csv with q1_load_deg … (encoders behind the gear)"
-    own_clock = True
+    own_clock = "q_load"
     sets_clocks = True
     instrument = (CLOCK, ENCODER_ZERO)
 
@@ -162,8 +169,9 @@ class GearLink(_DriveLink):
         )
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
-        """Yield the zeros of the encoders, which are set by hand."""
+        """Yield the zeros of the encoders, set by hand, and where in its play each joint begins."""
         yield ENCODER_ZERO, constants(trace) * mismatch.joint_zero_rad * ROUGH
+        yield PLAY_START, play_start_columns(trace, mismatch)
 
 
 def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
