@@ -36,16 +36,17 @@ class Likelihood:
     ) -> None:
         self.traces, self.noise = tuple(traces), tuple(noise)
         self.design = NuisanceDesign.of(nuisance)
-        self._columns = [
+        self.whitened_nuisance = [
             [
                 self._used(trace, j, own, self.design.places[number])
                 for j, own in enumerate(self.design.columns(number, trace))
             ]
             for number, trace in enumerate(self.traces)
         ]
+        """Of each trace and component."""
         self.once = CountedOnce(self.design)
         self._normal = np.eye(self.design.width)
-        for used in (each for own in self._columns for each in own):
+        for used in (each for own in self.whitened_nuisance for each in own):
             self._normal[np.ix_(used.at, used.at)] += used.values.T @ used.values
 
     def counting(self, once: CountedOnce) -> "Likelihood":
@@ -91,14 +92,14 @@ class Likelihood:
     def _projections(self, whitened: Floats) -> Floats:
         """Return Nᵀ·y (m, …) of whitened vectors (v, …)."""
         sums = np.zeros((self.design.width, *whitened.shape[1:]))
-        for own, columns in zip(self._split(whitened), self._columns, strict=True):
+        for own, columns in zip(self._split(whitened), self.whitened_nuisance, strict=True):
             for values, used in zip(np.split(own, len(columns)), columns, strict=True):
                 sums[used.at] += used.values.T @ values
         return sums
 
     def _explained(self, b: Floats) -> Floats:
         """Return L⁻¹·N·b (v, …)."""
-        return np.concatenate([used.values @ b[used.at] for own in self._columns for used in own])
+        return np.concatenate([used.values @ b[used.at] for own in self.whitened_nuisance for used in own])
 
     def nuisance_of(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return b (m,), within its bounds, that fits a whitened vector (v,) best beside some effects."""
@@ -138,7 +139,7 @@ class Likelihood:
     def own_nuisance(self, applied: Applied) -> Floats:
         """Return the whitened columns (v, m) of the runs' own nuisance but for that of an effect's form."""
         columns, first = np.zeros((len(self.clusters), self.design.width)), 0
-        for used in (each for own in self._columns for each in own):
+        for used in (each for own in self.whitened_nuisance for each in own):
             columns[first : first + len(used.values), used.at] = used.values
             first += len(used.values)
         columns[:, self.once.gone(applied)] = 0.0
@@ -199,7 +200,7 @@ class Likelihood:
                 for j, (values, used) in enumerate(zip(own, nuisance, strict=True))
             ]
             for trace, own, nuisance, at in zip(
-                self.traces, signatures, self._columns, self.design.places, strict=True
+                self.traces, signatures, self.whitened_nuisance, self.design.places, strict=True
             )
         ]
         stretches = [stretches_of(trace) for trace in self.traces]
