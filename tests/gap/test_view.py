@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from gcode2krl.gap.families.split_columns import SplitColumns
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.box import MOST
 

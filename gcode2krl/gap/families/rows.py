@@ -8,9 +8,10 @@ from scipy.sparse import csr_array
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.gap.beside.stretches import stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.families.split_columns import Part, SplitColumns
 from gcode2krl.gap.fit.block_sums import sums_between
+from gcode2krl.gap.fit.gram import UsedColumns
 from gcode2krl.gap.fit.likelihood import Likelihood
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
@@ -56,13 +57,12 @@ class Rows:
         return np.concatenate(blocks)
 
     def _nuisance(self) -> SplitColumns:
-        parts, first = [], 0
-        for number, own in enumerate(self.likelihood.whitened_nuisance):
-            for used in own:
-                values = self._in_blocks(number, used.values)
-                parts.append(Part(first, values, used.at))
-                first += len(values)
-        return SplitColumns(np.zeros((len(self), 0)), tuple(parts), self.likelihood.design.width)
+        columns = [
+            UsedColumns(self._in_blocks(number, used.values), used.at)
+            for number, own in enumerate(self.likelihood.whitened_nuisance)
+            for used in own
+        ]
+        return SplitColumns.of_parts(columns, self.likelihood.design.width)
 
     def _blocks(self, number: int, component: int, values: Floats) -> Floats:
         """Return the blocks of columns (n, c) of one trace; what is zero stays zero."""

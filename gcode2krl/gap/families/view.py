@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.families.rows import Rows
-from gcode2krl.gap.families.split_columns import SplitColumns
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.fit.box import MOST, boxed
 from gcode2krl.gap.thresholds import THRESHOLDS
 

@@ -31,11 +31,6 @@ class UsedColumns(NamedTuple):
     at: Ints
     """(u,) where they stand among all."""
 
-    def beside(self, nuisance: "UsedColumns", signatures: int, places: Ints) -> "UsedColumns":
-        """Return signatures with the nuisance, whose places in b are all of (w,), behind all of them."""
-        behind = signatures + np.searchsorted(places, nuisance.at)
-        return UsedColumns(np.column_stack([self.values, nuisance.values]), np.r_[self.at, behind])
-
 
 class SignatureGram:
     """Gram matrices of whitened signatures and nuisance, a stretch of time at a time."""
@@ -43,17 +38,24 @@ class SignatureGram:
     def __init__(
         self,
         columns: Sequence[Sequence[UsedColumns]],
+        nuisance: Sequence[Sequence[UsedColumns]],
         signatures: int,
         places: Sequence[Ints],
         stretches: Sequence[Ints],
     ) -> None:
-        """Take the whitened columns of each trace and component.
+        """Take the whitened columns of each trace and component: signatures, and nuisance.
 
-        The first ``signatures`` are signatures, the others nuisance that stands in b at ``places`` (w,);
+        So many ``signatures`` stand first; nuisance stands in b at ``places`` (w,), and behind them here;
         ``stretches`` (n,) number each row's stretch of time.
         """
         self.signatures, self.places = signatures, places
-        self._columns = columns
+        self._columns = [
+            [
+                (own, UsedColumns(used.values, signatures + np.searchsorted(at, used.at)))
+                for own, used in zip(of_trace, beside, strict=True)
+            ]
+            for of_trace, beside, at in zip(columns, nuisance, places, strict=True)
+        ]
         self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
         self._fixed = [
             [self._inner(number, rows) for rows in members] for number, members in enumerate(self._rows)
@@ -63,22 +65,24 @@ class SignatureGram:
         """Return inner products (s + w, s + w) of some rows of a trace."""
         width = self.signatures + len(self.places[number])
         gram = np.zeros((width, width))
-        for used in self._columns[number]:
-            own = used.values[rows]
-            gram[np.ix_(used.at, used.at)] += own.T @ own  # of one array BLAS makes half of the products
+        for both in self._columns[number]:
+            own = np.column_stack([used.values[rows] for used in both])
+            at = np.concatenate([used.at for used in both])
+            gram[np.ix_(at, at)] += own.T @ own  # of one array BLAS makes half of the products
         return gram
 
     def _cross(self, number: int, rows: Ints, new: Floats) -> Floats:
         """Return inner products (1 + t, s + w) of some rows of a trace with other columns (k, n, 1 + t)."""
         cross = np.zeros((new.shape[2], self.signatures + len(self.places[number])))
-        for own, used in zip(new, self._columns[number], strict=True):
-            cross[:, used.at] += own[rows].T @ used.values[rows]
+        for own, both in zip(new, self._columns[number], strict=True):
+            for used in both:
+                cross[:, used.at] += own[rows].T @ used.values[rows]
         return cross
 
     @classmethod
     def none(cls) -> "SignatureGram":
         """Return that of no trace."""
-        return cls([], 0, [], [])
+        return cls([], [], 0, [], [])
 
     @cached_property
     def totals(self) -> list[Floats]:

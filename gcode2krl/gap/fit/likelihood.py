@@ -19,6 +19,7 @@ from gcode2krl.gap.fit.gram import SignatureGram, UsedColumns
 from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.fit.split_columns import SplitColumns
 
 STEP_SHARE = 0.02
 """Differences are over this share of a typical size: within the linear range of effects, above rounding."""
@@ -136,15 +137,17 @@ class Likelihood:
         """Tell whether nuisance that each run has for itself is of the form of an effect."""
         return bool(self.once.gone(applied)[self.design.shared :].any())
 
-    def own_nuisance(self, applied: Applied) -> Floats:
+    @property
+    def split_nuisance(self) -> SplitColumns:
+        """(v, m) N, whitened."""
+        columns = [used for own in self.whitened_nuisance for used in own]
+        return SplitColumns.of_parts(columns, self.design.width)
+
+    def own_nuisance(self, applied: Applied) -> SplitColumns:
         """Return the whitened columns (v, m) of the runs' own nuisance but for that of an effect's form."""
-        columns, first = np.zeros((len(self.clusters), self.design.width)), 0
-        for used in (each for own in self.whitened_nuisance for each in own):
-            columns[first : first + len(used.values), used.at] = used.values
-            first += len(used.values)
-        columns[:, self.once.gone(applied)] = 0.0
-        columns[:, : self.design.shared] = 0.0
-        return columns
+        kept = ~self.once.gone(applied)
+        kept[: self.design.shared] = False
+        return self.split_nuisance.of(np.ones(len(self.clusters), dtype=np.bool_), kept)
 
     # Effects
 
@@ -195,16 +198,11 @@ class Likelihood:
         """Return the fast view of signatures (k, n, s) of each trace."""
         width = signatures[0].shape[2]
         columns = [
-            [
-                self._used(trace, j, values, np.arange(width)).beside(used, width, at)
-                for j, (values, used) in enumerate(zip(own, nuisance, strict=True))
-            ]
-            for trace, own, nuisance, at in zip(
-                self.traces, signatures, self.whitened_nuisance, self.design.places, strict=True
-            )
+            [self._used(trace, j, values, np.arange(width)) for j, values in enumerate(own)]
+            for trace, own in zip(self.traces, signatures, strict=True)
         ]
         stretches = [stretches_of(trace) for trace in self.traces]
-        return SignatureGram(columns, width, self.design.places, stretches)
+        return SignatureGram(columns, self.whitened_nuisance, width, self.design.places, stretches)
 
     def data(self, applied: Sequence[Applied], tangents: Sequence[Floats]) -> list[Floats]:
         """Return whitened [r, T] (k·n, 1 + t) of each trace with some effects, for `SignatureGram.beside`."""

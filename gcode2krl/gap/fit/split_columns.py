@@ -1,6 +1,6 @@
 """Columns of which each run and component has some: nuisance of one run is zero in all others."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.gap.fit.gram import UsedColumns
 
 
 class Part(NamedTuple):
@@ -43,11 +44,19 @@ class SplitColumns:
     def of_dense(cls, columns: Floats, components: Ints) -> "SplitColumns":
         """Return columns (v, m) by stretches of rows that are of one component (v,)."""
         edges = [0, *(np.flatnonzero(np.diff(components)) + 1).tolist(), len(columns)]
-        parts = []
-        for first, last in zip(edges[:-1], edges[1:], strict=True):
-            at = np.flatnonzero(columns[first:last].any(axis=0))
-            parts.append(Part(first, columns[first:last, at], at))
-        return cls(np.zeros((len(columns), 0)), tuple(parts), columns.shape[1])
+        parts = [columns[first:last] for first, last in zip(edges[:-1], edges[1:], strict=True)]
+        used = [np.flatnonzero(part.any(axis=0)) for part in parts]
+        own = [UsedColumns(part[:, at], at) for part, at in zip(parts, used, strict=True)]
+        return cls.of_parts(own, columns.shape[1])
+
+    @classmethod
+    def of_parts(cls, columns: Iterable[UsedColumns], width: int) -> "SplitColumns":
+        """Return the columns of parts that follow each other; values are shared."""
+        parts, first = [], 0
+        for used in columns:
+            parts.append(Part(first, used.values, used.at))
+            first += len(used.values)
+        return cls(np.zeros((first, 0)), tuple(parts), width)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -80,11 +89,16 @@ class SplitColumns:
     @cached_property
     def gram(self) -> Floats:
         """(t + m) squared: inner products."""
-        t, parts = self.whole.shape[1], np.zeros((self.width + 1, self.width + 1))
+        t, above = self.whole.shape[1], self.whole.T @ self
+        return np.concatenate([above, np.concatenate([above[:, t:].T, self.gram_in()], axis=1)])
+
+    def gram_in(self, rows: Bools | None = None) -> Floats:
+        """Return inner products (m, m), over some rows (v,), of those that are not of all rows."""
+        gram = np.zeros((self.width + 1, self.width + 1))
         for part in self.parts:
-            parts[np.ix_(part.at, part.at)] += part.values.T @ part.values
-        above = self.whole.T @ self
-        return np.concatenate([above, np.concatenate([above[:, t:].T, parts[:-1, :-1]], axis=1)])
+            own = part.values if rows is None else part.values[rows[part.rows]]
+            gram[np.ix_(part.at, part.at)] += own.T @ own
+        return gram[:-1, :-1]
 
     def used(self, rows: Bools) -> Bools:
         """Return which columns (t + m,) are not zero in some rows (v,), whole parts."""
@@ -97,11 +111,8 @@ class SplitColumns:
         """Return some rows (v,), whole parts, of some columns (m,); values are shared."""
         count = int(columns.sum())
         places = np.append(np.where(columns, np.cumsum(columns) - 1, count), count)
-        parts, first = [], 0
-        for part in self._within(rows):
-            parts.append(Part(first, part.values, places[part.at]))
-            first += len(part.values)
-        return SplitColumns(np.zeros((first, 0)), tuple(parts), count)
+        own = (UsedColumns(part.values, places[part.at]) for part in self._within(rows))
+        return SplitColumns.of_parts(own, count)
 
     def _within(self, rows: Bools) -> Iterator[Part]:
         return (part for part in self.parts if len(part.values) and rows[part.first])
