@@ -94,26 +94,46 @@ class SignatureGram:
         traces = []
         for number, (new, rows) in enumerate(zip(data, self._rows, strict=True)):
             own = new.reshape(len(self._columns[number]), -1, new.shape[1])
-            grams = [
-                _joined(own[:, at].reshape(-1, new.shape[1]), self._cross(number, at, own), fixed)
-                for at, fixed in zip(rows, self._fixed[number], strict=True)
-            ]
-            traces.append(TraceGram(np.stack(grams), np.sum(grams, axis=0), self.places[number]))
+            stretches = []
+            for at, fixed in zip(rows, self._fixed[number], strict=True):
+                columns = own[:, at].reshape(-1, new.shape[1])
+                stretches.append(_Joined(columns.T @ columns, self._cross(number, at, own), fixed))
+            inner, cross = (np.sum([each[i] for each in stretches], axis=0) for i in range(2))
+            total = np.block([[inner, cross], [cross.T, self.totals[number]]])
+            traces.append(TraceGram(tuple(stretches), total, self.places[number]))
         values = sum(len(new) for new in data)
         return Gram(tuple(traces), data[0].shape[1] - 1, self.signatures, values)
 
 
-def _joined(new: Floats, cross: Floats, fixed_gram: Floats) -> Floats:
-    """Return the Gram matrix of columns [new, fixed], that of the latter and of both being known."""
-    return np.block([[new.T @ new, cross], [cross.T, fixed_gram]])
+class _Joined(NamedTuple):
+    """The Gram matrix (c, c) of columns [r, T, S, N] by its blocks: that of [S, N], the largest, is shared."""
+
+    inner: Floats
+    """(1 + t, 1 + t) of [r, T]"""
+    cross: Floats
+    """(1 + t, s + w) of both"""
+    fixed: Floats
+    """(s + w, s + w) of [S, N]"""
+
+    def of(self, columns: Ints) -> Floats:
+        """Return the Gram matrix of some columns (c',)."""
+        is_new = columns < len(self.inner)
+        new, fixed = columns[is_new], columns[~is_new] - len(self.inner)
+        blocks = [
+            [self.inner[np.ix_(new, new)], self.cross[np.ix_(new, fixed)]],
+            [self.cross[np.ix_(new, fixed)].T, self.fixed[np.ix_(fixed, fixed)]],
+        ]
+        back = np.argsort(np.argsort(~is_new, kind="stable"))
+        gram: Floats = np.block(blocks)[np.ix_(back, back)]
+        return gram
 
 
 @dataclass(frozen=True, eq=False)
 class TraceGram:
     """Gram matrices of one trace, columns [r, T, S, N]."""
 
-    stretches: Floats
-    """(g, c, c)"""
+    stretches: tuple[_Joined, ...]
+    """One of each stretch of time."""
     total: Floats
     """(c, c)"""
     places: Ints
@@ -242,7 +262,7 @@ class Gram:
             into = np.r_[np.arange(len(given)), len(given) + each.places]
             basis = np.vstack([np.eye(len(chosen)), -explained[into]])
             for gram in each.stretches:
-                scores.append(basis[:, 1:].T @ gram[np.ix_(rows, rows)] @ (basis @ rest))
+                scores.append(basis[:, 1:].T @ gram.of(rows) @ (basis @ rest))
         return gain_inflation(inverse, np.array(scores), fitted=len(chosen))
 
     def _linear_fit(self, chosen: Ints, given: Ints) -> tuple[Floats, Floats, Floats]:

@@ -104,8 +104,11 @@ class Likelihood:
 
     def nuisance_of(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return b (m,), within its bounds, that fits a whitened vector (v,) best beside some effects."""
+        return self._nuisance(self._projections(whitened), applied)
+
+    def _nuisance(self, projections: Floats, applied: Sequence[Applied]) -> Floats:
+        """Return b (m,) of a vector by its projections Nᵀ·y (m,)."""
         kept, normal = self._kept(applied), self._normal
-        projections = self._projections(whitened)
         if kept is None:
             return boxed(normal, projections)
         free: Floats = kept @ boxed(_kept_normal(kept, normal), kept @ projections)
@@ -157,9 +160,11 @@ class Likelihood:
         return self.marginal(rest, applied)
 
     def chi2(self, applied: Sequence[Applied]) -> float:
-        """Return chi2 with some effects."""
-        r = self.residual(applied)
-        return float(r @ r)
+        """Return chi2 with some effects, by inner products: N is as large as all the data."""
+        y = self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
+        projections = self._projections(y)
+        b = self._nuisance(projections, applied)
+        return float(y @ y - 2.0 * b @ projections + b @ self._normal @ b)
 
     def tangents(self, numbers: Numbers, x: Floats, without: int | None = None) -> list[Floats]:
         """Return ∂f/∂θ (k, n, p) of each trace, in typical sizes, of all effects but one."""
