@@ -16,7 +16,7 @@ BLOCK = np.floor(TIME_S / 0.05).astype(int)
 def made(traces, residuals, signatures=None, nuisance=(), repeats=False):
     columns = signatures or [np.zeros((one.shape[1], len(one.time_s), 0)) for one in traces]
     usual = list(nuisance) or [[] for _ in traces]
-    return block_means(traces, residuals, columns, usual, repeats)
+    return list(block_means(traces, residuals, columns, usual, repeats))
 
 
 def by_hand(values):

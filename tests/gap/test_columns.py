@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from gcode2krl.gap.families.columns import Beside, Columns
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.families.steps import Steps
 from gcode2krl.gap.families.view import View
 from tests.gap import constructed as c
@@ -22,7 +23,7 @@ def beside():
     tangents = [GENERATOR.standard_normal((*trace.shape[::-1], 3)) for trace in traces]
     view = View.of(rows, [trace.residual for trace in traces], tangents)
     columns = Columns(GENERATOR.standard_normal((len(rows), 5)))
-    assert plain.nuisance.any()
+    assert plain.nuisance.dense.any()
     return Beside(view, columns), view.without_fixed(columns.values)
 
 
@@ -60,7 +61,9 @@ def test_views_of_one_component_may_keep_different_nuisance():
     rate = np.tile(np.sin(0.05 * np.arange(count)), joints)
     members = csr_array(np.ones((1, count * joints)))
     nothing = np.zeros((count * joints, 0))
-    plain = View(rate, nothing, rate[:, None], members, np.repeat(np.arange(joints), count))
+    components = np.repeat(np.arange(joints), count)
+    clock = SplitColumns.of_dense(rate[:, None], components)
+    plain = View(rate, nothing, clock, members, components)
     alike = plain.beside(rate, 50.0 * rate[:, None])
     assert plain.at(2).kept == ()
     assert alike.at(2).kept == (0,)

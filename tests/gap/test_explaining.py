@@ -36,7 +36,7 @@ def one(residual, link="servo", **more):
 def test_a_joint_has_its_own_torque_with_memory_among_its_columns():
     made = one(np.zeros((COUNT, 2)), torque_Nm=logged_torque())
     torque = Admissible(made).torque_Nm[:, 1]
-    (first, second), *_ = explaining_columns([made])
+    (first,), (second,) = explaining_columns([made])
     assert spanned(second, np.tanh(2.0 * torque)) > 0.99
     assert spanned(second, torque - Admissible(made).torque_with_memory(1)[:, 1]) > 0.999
     assert first.shape == second.shape
@@ -44,7 +44,7 @@ def test_a_joint_has_its_own_torque_with_memory_among_its_columns():
 
 def test_a_tip_has_a_vector_that_turns_with_the_tool():
     made = one(np.zeros((COUNT, 3)), link="mechanics")
-    ((_, y, _),) = explaining_columns([made])
+    _, (y,), _ = explaining_columns([made])
     vector = made.inputs.tool_rotation @ np.array([0.2, -0.1, 0.3])
     assert spanned(y, vector[:, 1]) > 0.999
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.box import MOST
 
@@ -22,7 +23,7 @@ def view(late, joints):
     return View(
         residual=residual + 0.1 * draw.standard_normal(rows),
         tangents=clock[:, None],
-        nuisance=np.zeros((rows, 0)),
+        nuisance=SplitColumns(np.zeros((rows, 0)), (), 0),
         members=csr_array(np.ones((1, rows))),
         components=np.repeat(np.arange(joints), COUNT),
     )
@@ -45,9 +46,8 @@ def test_joints_with_usual_lags_of_their_own_let_the_clock_be_unsure():
     lags = np.zeros((6 * COUNT, 6))
     for joint in range(6):
         lags[joint * COUNT : (joint + 1) * COUNT, joint] = usual / MOST * RATES[joint]
-    seen = replace(
-        plain, nuisance=10.0 * lags, tangents=10.0 * plain.tangents, residual=10.0 * plain.residual
-    )
+    nuisance = SplitColumns.of_dense(10.0 * lags, plain.components)
+    seen = replace(plain, nuisance=nuisance, tangents=10.0 * plain.tangents, residual=10.0 * plain.residual)
     assert seen.at(2).chi2 == pytest.approx(COUNT, rel=0.15)
 
 

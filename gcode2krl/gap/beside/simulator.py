@@ -13,13 +13,15 @@ LIMITS = THRESHOLDS.beside
 
 
 class Simulator:
-    """Simulates commanded paths and keeps the last 64 by what they were planned from.
+    """Simulates commanded paths and keeps the last ones, of long runs fewer, by what they were planned from.
 
     One belongs to one prediction, so that its cell and its laws are the same for all that it keeps.
     """
 
     def __init__(self) -> None:
         self._kept: OrderedDict[Hashable, Signals] = OrderedDict()
+        self._rows = 0
+        """Of all that are kept."""
         self._digests: WeakKeyDictionary[Inputs, bytes] = WeakKeyDictionary()
         self._fine: dict[bytes, Inputs] = {}
 
@@ -33,8 +35,11 @@ class Simulator:
         key = (self._digests[inputs], effects)
         if key not in self._kept:
             self._kept[key] = commanded(self._with_corners(inputs), applied)
-            if len(self._kept) > LIMITS.remembered_paths:
-                self._kept.popitem(last=False)
+            self._rows += len(self._kept[key].inputs)
+            while len(self._kept) > LIMITS.remembered_paths or (
+                len(self._kept) > 1 and self._rows > LIMITS.remembered_rows
+            ):
+                self._rows -= len(self._kept.popitem(last=False)[1].inputs)
         return self._kept[key]
 
     def _with_corners(self, inputs: Inputs) -> Inputs:

@@ -16,6 +16,7 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects.mismatch import sigma
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.fit.sensitivity import sensitivity_of
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
@@ -97,7 +98,7 @@ class _Residual:
 
     left: Floats
     change: Floats
-    nuisance: Floats
+    nuisance: SplitColumns
     """(v, m) each run's own, that of the effect's form left out."""
     run: Floats
     time_s: Floats
@@ -132,13 +133,13 @@ class _Residual:
         whole = float(self.change @ self.change)
         if not rows.any() or float(change @ change) < _LIMITS.least_part * whole:
             return None
-        columns = self.nuisance[rows][:, np.any(self.nuisance[rows] != 0.0, axis=0)]
-        inner = columns.T @ columns + np.eye(columns.shape[1])
-        explained = np.linalg.solve(inner, columns.T @ np.column_stack([change, left]))
-        information = float(change @ change - (columns.T @ change) @ explained[:, 0])
+        inner = self.nuisance.gram_in(rows) + np.eye(self.nuisance.width)
+        on_change, on_left = (np.stack([self.change, self.left]) * rows) @ self.nuisance
+        explained = np.linalg.solve(inner, np.column_stack([on_change, on_left]))
+        information = float(change @ change - on_change @ explained[:, 0])
         if information < _LIMITS.least_part * float(change @ change):  # the run's own mismatch does the same
             return None
-        share = float(change @ left - (columns.T @ change) @ explained[:, 1]) / information
+        share = float(change @ left - on_change @ explained[:, 1]) / information
         return Part(share, self.inflation / information)
 
 

@@ -153,7 +153,7 @@ def _functions(
             yield columns, np.eye(columns[0].shape[2])
         return
     for family in grid.families():
-        if family.on is evidence.on:
+        if family.on is evidence.on and family.place.name == evidence.place.name:
             yield from ((list(family.columns), root) for root in family.roots)
 
 

@@ -9,7 +9,9 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.gap.beside.stretches import stretches_of_all
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.block_sums import sums_between
+from gcode2krl.gap.fit.gram import UsedColumns
 from gcode2krl.gap.fit.likelihood import Likelihood
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
@@ -30,7 +32,7 @@ class Rows:
             np.concatenate([np.repeat(np.arange(k), n) for n, k in (trace.shape for trace in self.traces)])
         )
         """(v,) the component of each block."""
-        self.nuisance: Floats = self._nuisance()
+        self.nuisance = self._nuisance()
         """(v, m) N."""
 
     def __len__(self) -> int:
@@ -54,14 +56,13 @@ class Rows:
         ]
         return np.concatenate(blocks)
 
-    def _nuisance(self) -> Floats:
-        design = self.likelihood.design
-        columns = []
-        for number, trace in enumerate(self.traces):
-            wide = np.zeros((*trace.shape[::-1], design.width))
-            wide[:, :, design.places[number]] = design.columns(number, trace)
-            columns.append(wide)
-        return self.of(columns)
+    def _nuisance(self) -> SplitColumns:
+        columns = [
+            UsedColumns(self._in_blocks(number, used.values), used.at)
+            for number, own in enumerate(self.likelihood.whitened_nuisance)
+            for used in own
+        ]
+        return SplitColumns.of_parts(columns, self.likelihood.design.width)
 
     def _blocks(self, number: int, component: int, values: Floats) -> Floats:
         """Return the blocks of columns (n, c) of one trace; what is zero stays zero."""
@@ -74,8 +75,12 @@ class Rows:
         return blocks
 
     def _averaged(self, number: int, component: int, values: Floats) -> Floats:
-        starts, trace = self.starts[number], self.traces[number]
-        white = self.likelihood.noise[component].whiten(values, trace.segments)
+        return self._in_blocks(
+            number, self.likelihood.noise[component].whiten(values, self.traces[number].segments)
+        )
+
+    def _in_blocks(self, number: int, white: Floats) -> Floats:
+        starts = self.starts[number]
         if len(starts) == len(white):
             return white
         edges = np.append(starts, len(white))

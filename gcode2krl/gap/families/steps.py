@@ -18,6 +18,8 @@ _MOST = 40
 """Moments that are tried in one run."""
 _FROM_END_S = 1.0
 """A step nearer to an end of a run is a difference between runs."""
+_AT_ONCE = 40
+"""Moments whose columns are made together."""
 _FINER = 10
 """So many times closer are those around the best."""
 
@@ -71,17 +73,14 @@ class Steps:
             at[own] = np.arange(len(own))
             raw.append(_lifted(after, unit))
             chosen.append(at)
-        return self._of_moments(self.rows.of(raw, self.place.component), chosen)
-
-    def _of_moments(self, white: Floats, chosen: Sequence[Ints]) -> Floats:
-        """Return the columns (v, moments·d) that moments have in each trace, of those whitened."""
-        d = self.place.units[0].shape[2]
+        white, d = self.rows.of(raw, self.place.component), self.place.width
         counts = zip(self.place.units, self.rows.starts, strict=True)
         ends = np.cumsum([len(unit) * len(starts) for unit, starts in counts])
-        parts = zip(np.split(white, ends[:-1]), chosen, strict=True)
-        return np.concatenate(
-            [part.reshape(len(part), -1, d)[:, at].reshape(len(part), -1) for part, at in parts]
-        )
+        columns = np.empty((len(white), len(moments), d))
+        parts = zip(np.split(white, ends[:-1]), np.split(columns, ends[:-1]), chosen, strict=True)
+        for part, into, at in parts:
+            into[:] = part.reshape(len(part), -1, d)[:, at]
+        return columns.reshape(len(white), -1)
 
     def _is_later(self, number: int, run: int) -> bool:
         """Tell whether a trace is of a later run than another."""
@@ -112,11 +111,11 @@ def _lifted(after: Floats, unit: Floats) -> Floats:
 
 
 def scan(view: View, steps: Steps, columns: Columns, signs: Floats) -> tuple[Floats, Floats]:
-    """Return the log evidence (moments,) of steps, and its mean over moments (flips,) for random signs.
+    """Return the log evidence (moments,) of steps, and that (flips, moments) for random signs.
 
-    ``columns`` of all moments, d a moment.
+    ``columns`` of these moments, d a moment.
     """
-    d = steps.place.units[0].shape[2]
+    d = steps.place.width
     beside = Beside(view, columns)
     own = columns.values.reshape(len(columns.values), -1, d)
     fixed, taken = beside.fixed.reshape(own.shape[1], d, -1), beside.taken.T.reshape(own.shape[1], d, -1)
@@ -126,9 +125,9 @@ def scan(view: View, steps: Steps, columns: Columns, signs: Floats) -> tuple[Flo
     score = beside.score.reshape(-1, d)
     evidence = _each(values, np.einsum("mij,mi->mj", vectors, score))
     if not len(signs):
-        return evidence, np.zeros(0)
+        return evidence, np.zeros((0, len(evidence)))
     flipped = (signs @ beside.scores).reshape(len(signs), len(gram), d)
-    return evidence, log_mean(_each(values, np.einsum("mij,fmi->fmj", vectors, flipped)))
+    return evidence, _each(values, np.einsum("mij,fmi->fmj", vectors, flipped))
 
 
 def _each(values: Floats, scores: Floats) -> Floats:
@@ -146,17 +145,20 @@ def _each(values: Floats, scores: Floats) -> Floats:
     return each
 
 
-def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> Evidence | None:
-    """Return the evidence of a step at the best moment; ``coarse`` are the columns of all."""
-    if len(coarse) == 0:
-        return None
+def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
+    """Return the evidence of a step at the best moment."""
     moments = steps.coarse()
-    own, flipped = scan(view, steps, coarse, signs)
+    if not moments:
+        return None
+    # some moments at a time: the columns of all are many times the data
+    some = [moments[first : first + _AT_ONCE] for first in range(0, len(moments), _AT_ONCE)]
+    scans = [scan(view, steps, Columns(steps.blocks(each)), signs) for each in some]
+    own, flipped = (np.concatenate(each, axis=-1) for each in zip(*scans, strict=True))
     finer = steps.finer(moments[int(np.argmax(own))])
     fine = steps.blocks(finer)
     near, _ = scan(view, steps, Columns(fine), signs[:0])
     best = int(np.argmax(near))
-    d = steps.place.units[0].shape[2]
+    d = steps.place.width
     cost = float(np.max(own) - log_mean(own))
     found = evidence_of(
         view,
@@ -169,4 +171,4 @@ def step_evidence(view: View, steps: Steps, coarse: Columns, signs: Floats) -> E
         at=finer[best],
         cost=cost,
     )
-    return None if found is None else found.flipped_as(flipped)
+    return None if found is None else found.flipped_as(log_mean(flipped))

@@ -62,11 +62,10 @@ def _searched(
 ) -> Iterator[list[Evidence | None]]:
     """Yield for each view the families at a place whose moment or frequency the data must find."""
     steps = Steps(rows, place)
-    coarse = Columns(steps.blocks(steps.coarse()))
     for view, sign in zip(views, signs, strict=True):
         at = view.at(place.component)
         yield [
-            step_evidence(at, steps, coarse, sign),
+            step_evidence(at, steps, sign),
             *tones(rows, at, place, sign),
             *angle_tones(rows, at, place, sign),
         ]

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.families.rows import Rows
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.fit.box import MOST, boxed
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -28,7 +29,7 @@ class View:
 
     residual: Floats
     tangents: Floats
-    nuisance: Floats
+    nuisance: SplitColumns
     members: csr_array
     """(g, v) 1 where a block belongs to a stretch of time."""
     components: Ints
@@ -59,7 +60,7 @@ class View:
             said, deviation = self._said_beside(component)
             known = self._used(component) & ~np.isnan(said)
             alone = self._of_rows(component, self._used(component) & ~known)
-            columns = self.fixed[np.ix_(self.components == component, known)]
+            columns = self._of_rows(component, known).fixed.dense
             unsure = columns * (deviation[known] * _PRIOR**0.5)  # tangents have that wide prior
             self._of_component[component] = replace(
                 alone,
@@ -70,8 +71,7 @@ class View:
 
     def _used(self, component: int) -> Bools:
         """Return which of T and N (t + m,) are not zero in a component."""
-        used: Bools = np.any(self.fixed[self.components == component], axis=0)
-        return used
+        return self.fixed.used(self.components == component)
 
     def _of_rows(self, component: int, columns: Bools) -> "View":
         """Return the view of a component's rows with some of T and N (t + m,)."""
@@ -79,7 +79,7 @@ class View:
         return View(
             self.residual[rows],
             self.tangents[np.ix_(rows, columns[:t])],
-            self.nuisance[np.ix_(rows, columns[t:])],
+            self.nuisance.of(rows, columns[t:]),
             self.members[:, np.flatnonzero(rows)],
             self.components[rows],
             tuple(np.flatnonzero(columns[t:]).tolist()),
@@ -114,9 +114,9 @@ class View:
         return middle, unsure
 
     @cached_property
-    def fixed(self) -> Floats:
+    def fixed(self) -> SplitColumns:
         """(v, t + m) F: T and N."""
-        return np.concatenate([self.tangents, self.nuisance], axis=1)
+        return replace(self.nuisance, whole=self.tangents)
 
     @cached_property
     def _precision(self) -> Floats:
@@ -127,8 +127,7 @@ class View:
     @cached_property
     def _normal(self) -> Floats:
         """(t + m) squared: H = Fᵀ·F with the priors."""
-        normal: Floats = self.fixed.T @ self.fixed + np.diag(self._precision)
-        return normal
+        return self.fixed.gram + np.diag(self._precision)
 
     @cached_property
     def _factors(self) -> tuple[Floats, Ints]:
@@ -142,8 +141,7 @@ class View:
     @cached_property
     def cross(self) -> Floats:
         """(t + m,) Fᵀ·r."""
-        cross: Floats = self.fixed.T @ self.residual
-        return cross
+        return self.residual @ self.fixed
 
     @cached_property
     def projected(self) -> Floats:
@@ -153,7 +151,7 @@ class View:
 
     def without_fixed(self, columns: Floats) -> Floats:
         """Return columns (v, c) without what tangents and nuisance explain of them."""
-        left: Floats = columns - self.fixed @ self.solved(self.fixed.T @ columns)
+        left: Floats = columns - self.fixed @ self.solved((columns.T @ self.fixed).T)
         return left
 
     def by_stretch(self, values: Floats) -> csr_array:

@@ -1,6 +1,6 @@
 """Means over blocks of time of what was measured and of what may explain it: the data of the slow noise."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -53,16 +53,14 @@ def block_means(
     signatures: Sequence[Floats],
     nuisance: Sequence[Sequence[Nuisance]],
     repeats: bool,
-) -> list[BlockMeans]:
-    """Return the block means of each component of residuals (n, k).
+) -> Iterator[BlockMeans]:
+    """Yield the block means of each component of residuals (n, k).
 
     ``repeats``: the runs repeat one program; then of their orthonormal contrasts, without what they share.
     """
     blocks = [_Blocks.of(trace) for trace in traces]
     numbers = [each.numbers[each.kept] for each in blocks]
-    inputs = explaining_columns(traces)
-    made = []
-    for j in range(traces[0].shape[1]):
+    for j, inputs in enumerate(explaining_columns(traces)):
         y = [each.means(rows[:, j]) for each, rows in zip(blocks, residuals, strict=True)]
         signed = [each.means(columns[j]) for each, columns in zip(blocks, signatures, strict=True)]
         usual = [
@@ -70,9 +68,8 @@ def block_means(
             for each, own, trace in zip(blocks, nuisance, traces, strict=True)
         ]
         known = _stacked([*zip(map(_trend, numbers), usual, strict=True)], nuisance)
-        smooth = [each.means(own[j]) for each, own in zip(blocks, inputs, strict=True)]
-        made.append(_component(y, numbers, known, signed, smooth, repeats))
-    return made
+        smooth = [each.means(own) for each, own in zip(blocks, inputs, strict=True)]
+        yield _component(y, numbers, known, signed, smooth, repeats)
 
 
 def _component(

@@ -21,8 +21,8 @@ _STILL = 1e-9
 """A coordinate of less range does not move."""
 
 
-def explaining_columns(traces: Sequence[Trace]) -> list[list[Floats]]:
-    """Return columns (n, c) of each component of each trace, alike in all traces."""
+def explaining_columns(traces: Sequence[Trace]) -> Iterator[list[Floats]]:
+    """Yield for each component columns (n, c) of each trace, alike in all traces."""
     inputs = [Admissible(trace) for trace in traces]
     parts = [
         [np.column_stack([*_of_motion(each)]) for each in inputs],
@@ -34,10 +34,11 @@ def explaining_columns(traces: Sequence[Trace]) -> list[list[Floats]]:
     if len({each.temperature_C.shape[1] for each in inputs}) == 1:
         parts.append([each.temperature_C for each in inputs])
     shared = [np.column_stack(own) for own in zip(*parts, strict=True)]
-    return [
-        [np.column_stack([common, *_of_component(each, j)]) for j in range(each.trace.shape[1])]
-        for each, common in zip(inputs, shared, strict=True)
-    ]
+    for j in range(traces[0].shape[1]):
+        yield [
+            np.column_stack([common, *_of_component(each, j)])
+            for each, common in zip(inputs, shared, strict=True)
+        ]
 
 
 def _of_motion(inputs: Admissible) -> Iterator[Floats]:

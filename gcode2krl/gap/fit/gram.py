@@ -31,11 +31,6 @@ class UsedColumns(NamedTuple):
     at: Ints
     """(u,) where they stand among all."""
 
-    def beside(self, nuisance: "UsedColumns", signatures: int, places: Ints) -> "UsedColumns":
-        """Return signatures with the nuisance, whose places in b are all of (w,), behind all of them."""
-        behind = signatures + np.searchsorted(places, nuisance.at)
-        return UsedColumns(np.column_stack([self.values, nuisance.values]), np.r_[self.at, behind])
-
 
 class SignatureGram:
     """Gram matrices of whitened signatures and nuisance, a stretch of time at a time."""
@@ -43,17 +38,24 @@ class SignatureGram:
     def __init__(
         self,
         columns: Sequence[Sequence[UsedColumns]],
+        nuisance: Sequence[Sequence[UsedColumns]],
         signatures: int,
         places: Sequence[Ints],
         stretches: Sequence[Ints],
     ) -> None:
-        """Take the whitened columns of each trace and component.
+        """Take the whitened columns of each trace and component: signatures, and nuisance.
 
-        The first ``signatures`` are signatures, the others nuisance that stands in b at ``places`` (w,);
+        So many ``signatures`` stand first; nuisance stands in b at ``places`` (w,), and behind them here;
         ``stretches`` (n,) number each row's stretch of time.
         """
         self.signatures, self.places = signatures, places
-        self._columns = columns
+        self._columns = [
+            [
+                (own, UsedColumns(used.values, signatures + np.searchsorted(at, used.at)))
+                for own, used in zip(of_trace, beside, strict=True)
+            ]
+            for of_trace, beside, at in zip(columns, nuisance, places, strict=True)
+        ]
         self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
         self._fixed = [
             [self._inner(number, rows) for rows in members] for number, members in enumerate(self._rows)
@@ -63,22 +65,24 @@ class SignatureGram:
         """Return inner products (s + w, s + w) of some rows of a trace."""
         width = self.signatures + len(self.places[number])
         gram = np.zeros((width, width))
-        for used in self._columns[number]:
-            own = used.values[rows]
-            gram[np.ix_(used.at, used.at)] += own.T @ own  # of one array BLAS makes half of the products
+        for both in self._columns[number]:
+            own = np.column_stack([used.values[rows] for used in both])
+            at = np.concatenate([used.at for used in both])
+            gram[np.ix_(at, at)] += own.T @ own  # of one array BLAS makes half of the products
         return gram
 
     def _cross(self, number: int, rows: Ints, new: Floats) -> Floats:
         """Return inner products (1 + t, s + w) of some rows of a trace with other columns (k, n, 1 + t)."""
         cross = np.zeros((new.shape[2], self.signatures + len(self.places[number])))
-        for own, used in zip(new, self._columns[number], strict=True):
-            cross[:, used.at] += own[rows].T @ used.values[rows]
+        for own, both in zip(new, self._columns[number], strict=True):
+            for used in both:
+                cross[:, used.at] += own[rows].T @ used.values[rows]
         return cross
 
     @classmethod
     def none(cls) -> "SignatureGram":
         """Return that of no trace."""
-        return cls([], 0, [], [])
+        return cls([], [], 0, [], [])
 
     @cached_property
     def totals(self) -> list[Floats]:
@@ -90,26 +94,46 @@ class SignatureGram:
         traces = []
         for number, (new, rows) in enumerate(zip(data, self._rows, strict=True)):
             own = new.reshape(len(self._columns[number]), -1, new.shape[1])
-            grams = [
-                _joined(own[:, at].reshape(-1, new.shape[1]), self._cross(number, at, own), fixed)
-                for at, fixed in zip(rows, self._fixed[number], strict=True)
-            ]
-            traces.append(TraceGram(np.stack(grams), np.sum(grams, axis=0), self.places[number]))
+            stretches = []
+            for at, fixed in zip(rows, self._fixed[number], strict=True):
+                columns = own[:, at].reshape(-1, new.shape[1])
+                stretches.append(_Joined(columns.T @ columns, self._cross(number, at, own), fixed))
+            inner, cross = (np.sum([each[i] for each in stretches], axis=0) for i in range(2))
+            total = np.block([[inner, cross], [cross.T, self.totals[number]]])
+            traces.append(TraceGram(tuple(stretches), total, self.places[number]))
         values = sum(len(new) for new in data)
         return Gram(tuple(traces), data[0].shape[1] - 1, self.signatures, values)
 
 
-def _joined(new: Floats, cross: Floats, fixed_gram: Floats) -> Floats:
-    """Return the Gram matrix of columns [new, fixed], that of the latter and of both being known."""
-    return np.block([[new.T @ new, cross], [cross.T, fixed_gram]])
+class _Joined(NamedTuple):
+    """The Gram matrix (c, c) of columns [r, T, S, N] by its blocks: that of [S, N], the largest, is shared."""
+
+    inner: Floats
+    """(1 + t, 1 + t) of [r, T]"""
+    cross: Floats
+    """(1 + t, s + w) of both"""
+    fixed: Floats
+    """(s + w, s + w) of [S, N]"""
+
+    def of(self, columns: Ints) -> Floats:
+        """Return the Gram matrix of some columns (c',)."""
+        is_new = columns < len(self.inner)
+        new, fixed = columns[is_new], columns[~is_new] - len(self.inner)
+        blocks = [
+            [self.inner[np.ix_(new, new)], self.cross[np.ix_(new, fixed)]],
+            [self.cross[np.ix_(new, fixed)].T, self.fixed[np.ix_(fixed, fixed)]],
+        ]
+        back = np.argsort(np.argsort(~is_new, kind="stable"))
+        gram: Floats = np.block(blocks)[np.ix_(back, back)]
+        return gram
 
 
 @dataclass(frozen=True, eq=False)
 class TraceGram:
     """Gram matrices of one trace, columns [r, T, S, N]."""
 
-    stretches: Floats
-    """(g, c, c)"""
+    stretches: tuple[_Joined, ...]
+    """One of each stretch of time."""
     total: Floats
     """(c, c)"""
     places: Ints
@@ -238,7 +262,7 @@ class Gram:
             into = np.r_[np.arange(len(given)), len(given) + each.places]
             basis = np.vstack([np.eye(len(chosen)), -explained[into]])
             for gram in each.stretches:
-                scores.append(basis[:, 1:].T @ gram[np.ix_(rows, rows)] @ (basis @ rest))
+                scores.append(basis[:, 1:].T @ gram.of(rows) @ (basis @ rest))
         return gain_inflation(inverse, np.array(scores), fitted=len(chosen))
 
     def _linear_fit(self, chosen: Ints, given: Ints) -> tuple[Floats, Floats, Floats]:

@@ -19,6 +19,7 @@ from gcode2krl.gap.fit.gram import SignatureGram, UsedColumns
 from gcode2krl.gap.fit.least_squares import derivative
 from gcode2krl.gap.fit.noise import Noise
 from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.fit.split_columns import SplitColumns
 
 STEP_SHARE = 0.02
 """Differences are over this share of a typical size: within the linear range of effects, above rounding."""
@@ -36,16 +37,17 @@ class Likelihood:
     ) -> None:
         self.traces, self.noise = tuple(traces), tuple(noise)
         self.design = NuisanceDesign.of(nuisance)
-        self._columns = [
+        self.whitened_nuisance = [
             [
                 self._used(trace, j, own, self.design.places[number])
                 for j, own in enumerate(self.design.columns(number, trace))
             ]
             for number, trace in enumerate(self.traces)
         ]
+        """Of each trace and component."""
         self.once = CountedOnce(self.design)
         self._normal = np.eye(self.design.width)
-        for used in (each for own in self._columns for each in own):
+        for used in (each for own in self.whitened_nuisance for each in own):
             self._normal[np.ix_(used.at, used.at)] += used.values.T @ used.values
 
     def counting(self, once: CountedOnce) -> "Likelihood":
@@ -91,19 +93,22 @@ class Likelihood:
     def _projections(self, whitened: Floats) -> Floats:
         """Return Nᵀ·y (m, …) of whitened vectors (v, …)."""
         sums = np.zeros((self.design.width, *whitened.shape[1:]))
-        for own, columns in zip(self._split(whitened), self._columns, strict=True):
+        for own, columns in zip(self._split(whitened), self.whitened_nuisance, strict=True):
             for values, used in zip(np.split(own, len(columns)), columns, strict=True):
                 sums[used.at] += used.values.T @ values
         return sums
 
     def _explained(self, b: Floats) -> Floats:
         """Return L⁻¹·N·b (v, …)."""
-        return np.concatenate([used.values @ b[used.at] for own in self._columns for used in own])
+        return np.concatenate([used.values @ b[used.at] for own in self.whitened_nuisance for used in own])
 
     def nuisance_of(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return b (m,), within its bounds, that fits a whitened vector (v,) best beside some effects."""
+        return self._nuisance(self._projections(whitened), applied)
+
+    def _nuisance(self, projections: Floats, applied: Sequence[Applied]) -> Floats:
+        """Return b (m,) of a vector by its projections Nᵀ·y (m,)."""
         kept, normal = self._kept(applied), self._normal
-        projections = self._projections(whitened)
         if kept is None:
             return boxed(normal, projections)
         free: Floats = kept @ boxed(_kept_normal(kept, normal), kept @ projections)
@@ -135,15 +140,17 @@ class Likelihood:
         """Tell whether nuisance that each run has for itself is of the form of an effect."""
         return bool(self.once.gone(applied)[self.design.shared :].any())
 
-    def own_nuisance(self, applied: Applied) -> Floats:
+    @property
+    def split_nuisance(self) -> SplitColumns:
+        """(v, m) N, whitened."""
+        columns = [used for own in self.whitened_nuisance for used in own]
+        return SplitColumns.of_parts(columns, self.design.width)
+
+    def own_nuisance(self, applied: Applied) -> SplitColumns:
         """Return the whitened columns (v, m) of the runs' own nuisance but for that of an effect's form."""
-        columns, first = np.zeros((len(self.clusters), self.design.width)), 0
-        for used in (each for own in self._columns for each in own):
-            columns[first : first + len(used.values), used.at] = used.values
-            first += len(used.values)
-        columns[:, self.once.gone(applied)] = 0.0
-        columns[:, : self.design.shared] = 0.0
-        return columns
+        kept = ~self.once.gone(applied)
+        kept[: self.design.shared] = False
+        return self.split_nuisance.of(np.ones(len(self.clusters), dtype=np.bool_), kept)
 
     # Effects
 
@@ -153,9 +160,11 @@ class Likelihood:
         return self.marginal(rest, applied)
 
     def chi2(self, applied: Sequence[Applied]) -> float:
-        """Return chi2 with some effects."""
-        r = self.residual(applied)
-        return float(r @ r)
+        """Return chi2 with some effects, by inner products: N is as large as all the data."""
+        y = self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
+        projections = self._projections(y)
+        b = self._nuisance(projections, applied)
+        return float(y @ y - 2.0 * b @ projections + b @ self._normal @ b)
 
     def tangents(self, numbers: Numbers, x: Floats, without: int | None = None) -> list[Floats]:
         """Return ∂f/∂θ (k, n, p) of each trace, in typical sizes, of all effects but one."""
@@ -194,16 +203,11 @@ class Likelihood:
         """Return the fast view of signatures (k, n, s) of each trace."""
         width = signatures[0].shape[2]
         columns = [
-            [
-                self._used(trace, j, values, np.arange(width)).beside(used, width, at)
-                for j, (values, used) in enumerate(zip(own, nuisance, strict=True))
-            ]
-            for trace, own, nuisance, at in zip(
-                self.traces, signatures, self._columns, self.design.places, strict=True
-            )
+            [self._used(trace, j, values, np.arange(width)) for j, values in enumerate(own)]
+            for trace, own in zip(self.traces, signatures, strict=True)
         ]
         stretches = [stretches_of(trace) for trace in self.traces]
-        return SignatureGram(columns, width, self.design.places, stretches)
+        return SignatureGram(columns, self.whitened_nuisance, width, self.design.places, stretches)
 
     def data(self, applied: Sequence[Applied], tangents: Sequence[Floats]) -> list[Floats]:
         """Return whitened [r, T] (k·n, 1 + t) of each trace with some effects, for `SignatureGram.beside`."""

@@ -1,6 +1,6 @@
 """Where a link's noise is learnt: repeats of one program, or what is left of a run beside everything slow."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,16 +128,12 @@ class _Explained:
 
     def __init__(self, trace: Trace, signatures: Floats, nuisance: Sequence[Nuisance]) -> None:
         parts = [signatures, *(each.columns for each in nuisance)]
-        # of each component those columns that are not zero there: most effects of a joint move it alone
-        self._used = [
-            np.flatnonzero(np.concatenate([p[j].any(axis=0) for p in parts])) for j in range(trace.shape[1])
-        ]
-        self._columns = [
-            np.concatenate([part[j] for part in parts], axis=1)[:, used] for j, used in enumerate(self._used)
-        ]
         width = sum(part.shape[2] for part in parts)
+        self._columns = [list(_runs_of_columns(parts, j)) for j in range(trace.shape[1])]
         gram = np.zeros((width, width))
-        for columns, used in zip(self._columns, self._used, strict=True):
+        for own in self._columns:
+            used = np.concatenate([np.zeros(0, dtype=int), *(np.arange(at.start, at.stop) for at, _ in own)])
+            columns = np.concatenate([np.zeros((len(trace.time_s), 0)), *(run for _, run in own)], axis=1)
             gram[np.ix_(used, used)] += columns.T @ columns
         self._kept = np.flatnonzero(np.diag(gram))
         self._scale = np.sqrt(np.diag(gram)[self._kept])
@@ -155,12 +151,15 @@ class _Explained:
         if not len(self._kept):
             return values
         sums = np.zeros(self._width)
-        for j, (columns, used) in enumerate(zip(self._columns, self._used, strict=True)):
-            sums[used] += columns.T @ values[:, j]
+        for j, own in enumerate(self._columns):
+            for at, columns in own:
+                sums[at] += columns.T @ values[:, j]
         weights = np.zeros(self._width)
         weights[self._kept] = np.linalg.solve(self._gram, sums[self._kept] / self._scale) / self._scale
-        explained = [columns @ weights[used] for columns, used in zip(self._columns, self._used, strict=True)]
-        unexplained: Floats = values - np.stack(explained, axis=1)
+        unexplained = values.copy()
+        for j, own in enumerate(self._columns):
+            for at, columns in own:
+                unexplained[:, j] -= columns @ weights[at]
         return unexplained
 
     def fast(self, values: Floats) -> Floats:
@@ -169,6 +168,20 @@ class _Explained:
 
         quick: Floats = values - self._hats @ splu(self._hats_gram).solve(self._hats.T @ values)
         return quick
+
+
+def _runs_of_columns(parts: Sequence[Floats], component: int) -> Iterator[tuple[slice, Floats]]:
+    """Yield the columns (n, u) of parts (k, n, c) that are not zero in a component, and their places among all.
+
+    Neighbours together, and none copied: most effects of a joint move it alone.
+    """
+    first = 0
+    for part in parts:
+        used = np.flatnonzero(part[component].any(axis=0))
+        for run in np.split(used, np.flatnonzero(np.diff(used) > 1) + 1) if len(used) else ():
+            a, b = int(run[0]), int(run[-1]) + 1
+            yield slice(first + a, first + b), part[component][:, a:b]
+        first += part.shape[2]
 
 
 def _hats(time_s: Floats, knots_s: Floats) -> csc_array:

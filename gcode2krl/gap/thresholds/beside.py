@@ -167,6 +167,7 @@ class BesideThresholds:
 
     remembered_plans: int = convention(64, "plans of one prediction that are kept")
     remembered_paths: int = convention(64, "commanded paths that are kept")
+    remembered_rows: int = convention(300_000, "of these paths together: some 700 bytes each")
     log_ends_s: float = convention(
         0.02, "a log alone may begin in motion: late samples of its first 20 ms have no model"
     )
