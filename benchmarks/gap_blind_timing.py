@@ -1,4 +1,4 @@
-"""Time and memory of a diagnosis of three runs, of 56 s by default: 12 ms, load encoders, tracker at 100 Hz."""
+"""Time and memory of a diagnosis of three runs, 56 s by default: 12 ms, load encoders, tracker at 100 Hz."""
 
 import resource
 import tempfile

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from gcode2krl.gap.families.columns import Beside, Columns
-from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.families.steps import Steps
 from gcode2krl.gap.families.view import View
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from tests.gap import constructed as c
 from tests.gap.test_families import view_of
 

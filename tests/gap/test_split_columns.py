@@ -24,7 +24,10 @@ def test_split_columns_are_those_of_one_array():
     part = split.of(some, kept)
     inner = columns[np.ix_(some, kept)]
     assert sum(each.values.size for each in split.parts) == np.count_nonzero(columns)
-    assert all(np.shares_memory(each.values, split.parts[i].values) for each, i in zip(part.parts, (1, 4)))
+    assert all(
+        np.shares_memory(each.values, split.parts[i].values)
+        for each, i in zip(part.parts, (1, 4), strict=True)
+    )
     np.testing.assert_array_equal(split.used(some), dense[some].any(axis=0))
     for found, expected in (
         (split.dense, dense),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.box import MOST
+from gcode2krl.gap.fit.split_columns import SplitColumns
 
 COUNT = 300
 RATES = [np.sin(np.arange(COUNT) * (0.02 + 0.01 * joint)) for joint in range(6)]

@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.gap.families.rows import Rows
-from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.fit.box import MOST, boxed
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _PRIOR = THRESHOLDS.fit.prior_sizes**-2

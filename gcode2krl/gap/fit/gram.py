@@ -106,7 +106,7 @@ class SignatureGram:
 
 
 class _Joined(NamedTuple):
-    """The Gram matrix (c, c) of columns [r, T, S, N] by its blocks: that of [S, N], the largest, is shared."""
+    """The Gram matrix (c, c) of columns [r, T, S, N] by blocks: that of [S, N], the largest, is shared."""
 
     inner: Floats
     """(1 + t, 1 + t) of [r, T]"""

@@ -171,7 +171,7 @@ class _Explained:
 
 
 def _runs_of_columns(parts: Sequence[Floats], component: int) -> Iterator[tuple[slice, Floats]]:
-    """Yield the columns (n, u) of parts (k, n, c) that are not zero in a component, and their places among all.
+    """Yield the columns (n, u) of parts (k, n, c) that are not zero in a component, and their places.
 
     Neighbours together, and none copied: most effects of a joint move it alone.
     """

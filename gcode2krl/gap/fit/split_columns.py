@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ class SplitColumns:
     def of_dense(cls, columns: Floats, components: Ints) -> "SplitColumns":
         """Return columns (v, m) by stretches of rows that are of one component (v,)."""
         edges = [0, *(np.flatnonzero(np.diff(components)) + 1).tolist(), len(columns)]
-        parts = [columns[first:last] for first, last in zip(edges[:-1], edges[1:], strict=True)]
+        parts = [columns[first:last] for first, last in pairwise(edges)]
         used = [np.flatnonzero(part.any(axis=0)) for part in parts]
         own = [UsedColumns(part[:, at], at) for part, at in zip(parts, used, strict=True)]
         return cls.of_parts(own, columns.shape[1])
