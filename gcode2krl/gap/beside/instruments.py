@@ -48,7 +48,8 @@ def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     motor_rad = (inputs.q_cmd_rad if inputs.q_act_rad is None else inputs.q_act_rad)[rows]
     at_end = np.vstack([motor_rad[:1] + half_rad, motor_rad])
     begun = [play(at_end[:, j], half_rad)[1:] - play(motor_rad[:, j], half_rad) for j in trace.columns]
-    return component_columns(np.nan_to_num(np.stack(begun, axis=1))) / 3.0**0.5
+    begun_rad = np.nan_to_num(np.stack(begun, axis=1))  # joints without an encoder
+    return component_columns(begun_rad / 3.0**0.5)
 
 
 def force_zero_columns(trace: "Trace") -> Floats:

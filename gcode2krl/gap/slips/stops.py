@@ -18,8 +18,8 @@ from gcode2krl.gap.beside.clocks import with_table_clock
 from gcode2krl.gap.beside.corners import rows_of_passing
 from gcode2krl.gap.beside.links import MECHANICS, PATH
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.beside.timing import gone
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.fit.place_times import gone
 from gcode2krl.gap.slips.slip import Slip, motion_traces
 from gcode2krl.gap.thresholds import THRESHOLDS
 
