@@ -13,6 +13,8 @@ from gcode2krl.gap.fit.design import Question
 from gcode2krl.gap.fit.signatures import blocks_of
 from tests.gap import constructed as c
 
+pytestmark = pytest.mark.slow
+
 SIGMA_RAD = 5e-6
 
 
