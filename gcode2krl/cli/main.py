@@ -103,9 +103,15 @@ def commands() -> None:
     """
 
 
+_MATRIX_LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""One thread each: matrices here are small, and threads that wait took half of a diagnosis's processor time."""
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     reserve_standard_files()
+    for library in _MATRIX_LIBRARIES:
+        os.environ.setdefault(library, "1")
     if "_GCODE2KRL_COMPLETE" in os.environ:
         import gcode2krl.cli.completion  # noqa: F401  (PowerShell is added to click's shells)
     code = _run(args)

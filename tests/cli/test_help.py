@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import subprocess
 import sys
 
@@ -76,3 +77,19 @@ def test_a_help_text_imports_nothing_heavy(words):
     assert done.stdout
     assert not imported & set(HEAVY)
     assert "numpy" not in imported or " ".join(words).startswith(WITH_NUMPY)
+
+
+def test_libraries_for_matrices_use_one_thread_unless_told_otherwise():
+    """They read it when they are loaded, so it is set before."""
+    script = (
+        "import os, sys; from gcode2krl.cli.main import main\n"
+        "assert 'numpy' not in sys.modules\n"
+        "try: main(['--version'])\n"
+        "except SystemExit: print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['MKL_NUM_THREADS'])\n"
+    )
+    environment = {**os.environ, "MKL_NUM_THREADS": "2"}
+    environment.pop("OPENBLAS_NUM_THREADS", None)
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split()[-2:] == ["1", "2"]
