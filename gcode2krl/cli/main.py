@@ -104,7 +104,7 @@ def commands() -> None:
 
 
 _MATRIX_LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""One thread each: matrices here are small, and threads that wait took half of a diagnosis's processor time."""
+"""One thread each: matrices are small, and threads that wait took half of a diagnosis."""
 
 
 def main(args: list[str] | None = None) -> None:
