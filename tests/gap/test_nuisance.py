@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
-from gcode2krl.effects import library
+from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.instruments import CLOCK
+from gcode2krl.gap.fit.box import MOST
 from gcode2krl.gap.fit.nuisance import nuisance_of
 from gcode2krl.gap.fit.signatures import Signatures
 from tests.gap.constructed import joint_rates, motion, trace
@@ -127,6 +128,39 @@ def test_play_and_lag_are_those_of_the_effects_at_the_size_of_their_bound():
     np.testing.assert_allclose(
         np.hypot(*swing.T), np.full(500, np.radians(5e-4) / ROOT3), rtol=1e-9
     )  # sine and cosine
+
+
+def test_any_lag_within_its_bound_is_two_columns_to_second_order():
+    servo = trace(np.zeros((500, 6)), "servo")
+    found = nuisance(servo)
+    columns = np.concatenate(
+        [found[name].columns[1] for name in ("servo_lag A2", "servo_lag A2, bent")], axis=1
+    )
+    late = Applied(LIBRARY["servo_lag"], "A2", {"tau_s": 2e-4})
+    change = (servo.sample([late]) - servo.nominal)[:, 1]
+    weights, *_ = np.linalg.lstsq(columns, change, rcond=None)
+    straight, *_ = np.linalg.lstsq(columns[:, :1], change, rcond=None)
+    left, more = change - columns @ weights, change - columns[:, :1] @ straight
+    assert np.linalg.norm(left) < 0.1 * np.linalg.norm(more)
+    assert np.abs(weights).max() < MOST
+
+
+def test_a_run_may_begin_anywhere_in_a_play():
+    gear = trace(np.zeros((500, 6)), "gear")
+    begun = nuisance(gear)["start of play"].columns
+    assert begun[2, 0, 2] == pytest.approx(BOUNDS.play_rad / 2.0 / ROOT3)
+    assert not begun[2, -1, 2]  # crossed
+    assert not begun[2, :, [0, 1, 3, 4, 5]].any()
+
+
+def test_the_clock_of_a_table_is_the_effect_of_that_name(force):
+    assert nuisance(force)[CLOCK].block.key == ("clock", "force")
+    assert nuisance(trace(np.zeros((500, 6)), "gear"))[CLOCK].block.key == ("clock", "q_load")
+
+
+def test_a_cutter_within_its_tolerances_is_no_swapped_tool():
+    usual = LIBRARY["swapped_tool"].usual(BOUNDS, 20.0)
+    assert usual == {"diameter_mm": BOUNDS.diameter_mm, "length_mm": BOUNDS.length_mm}
 
 
 def test_links_that_are_not_measured_bring_their_mismatch_along(tip):
