@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from gcode2krl.batch.talk import receive, send
+from gcode2krl.compiled import MATRIX_VARIABLES
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 
 _SERVE = "import sys; sys.path[:] = sys.argv[1:]; from gcode2krl.batch.worker import serve; serve()"
-_LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_LIBRARIES = ("OMP_NUM_THREADS", *MATRIX_VARIABLES)
 _LONGEST_WORD = 200
 
 

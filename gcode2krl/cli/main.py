@@ -13,6 +13,7 @@ from gcode2krl.cli.on_use import CommandsOnUse
 from gcode2krl.cli.record_head import Heading
 from gcode2krl.cli.standard_files import flushed, reserve_standard_files
 from gcode2krl.codes import closest
+from gcode2krl.compiled import MATRIX_VARIABLES
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.version import __version__
 
@@ -103,15 +104,11 @@ def commands() -> None:
     """
 
 
-_MATRIX_LIBRARIES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""One thread each: matrices are small, and threads that wait took half of a diagnosis."""
-
-
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     reserve_standard_files()
-    for library in _MATRIX_LIBRARIES:
-        os.environ.setdefault(library, "1")
+    for variable in MATRIX_VARIABLES:  # matrices are small: threads that wait took half of a diagnosis
+        os.environ.setdefault(variable, "1")
     if "_GCODE2KRL_COMPLETE" in os.environ:
         import gcode2krl.cli.completion  # noqa: F401  (PowerShell is added to click's shells)
     code = _run(args)

@@ -39,17 +39,18 @@ def component_columns(values: Floats) -> Floats:
 
 
 def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
-    """Return (k, n, k): where in its play each joint stands when the run begins.
+    """Return (k, n, k): where in its play each joint stands when the run begins, even between its ends.
 
-    Until the play has been crossed once.
+    Until the play has been crossed once (Krasnosel'skii and Pokrovskii 1989); that it is even is assumed.
     """
     inputs, half_rad = trace.inputs, mismatch.play_rad / 2.0
     rows = nearest_rows(inputs.time_s, trace.time_s)
     motor_rad = (inputs.q_cmd_rad if inputs.q_act_rad is None else inputs.q_act_rad)[rows]
+    # a row before the first one puts the joint at the end of its play
     at_end = np.vstack([motor_rad[:1] + half_rad, motor_rad])
     begun = [play(at_end[:, j], half_rad)[1:] - play(motor_rad[:, j], half_rad) for j in trace.columns]
     begun_rad = np.nan_to_num(np.stack(begun, axis=1))  # joints without an encoder
-    return component_columns(begun_rad / 3.0**0.5)
+    return component_columns(begun_rad * sigma(1.0))
 
 
 def force_zero_columns(trace: "Trace") -> Floats:

@@ -80,8 +80,8 @@ def residual_by_place(trace: Trace, applied: Sequence[Applied]) -> Floats:
         return plain
     # over rests, and where the rows end before the path does, it is as late as before
     late = np.interp(trace.time_s, trace.time_s[moves], late[moves])
-    left: Floats = np.where(moves[:, None], beside, 0.0) - rate * late[:, None]
-    return left
+    first_order: Floats = np.where(moves[:, None], beside, 0.0) - rate * late[:, None]
+    return first_order
 
 
 def gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:

@@ -126,9 +126,9 @@ class Rest:
             for each in self.study.evidences
             if each.on is Dependence.RUN_TIME and each.place.component == evidence.place.component
         )
-        once = 0.0 if evidence.on is Dependence.RUN_TIME_STEP else evidence.in_one
-        of_others = evidence.nats - 0.5 * evidence.gain * once
-        return (of_others - max(own_time, default=0.0)) / evidence.inflation
+        one_share = 0.0 if evidence.on is Dependence.RUN_TIME_STEP else evidence.in_one
+        others_nats = evidence.nats - 0.5 * evidence.gain * one_share
+        return (others_nats - max(own_time, default=0.0)) / evidence.inflation
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
