@@ -6,6 +6,7 @@ What several tests build of fit/ and choose/ is built here, so that a renamed fu
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,12 +23,13 @@ from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.selection import examine
 from gcode2krl.gap.fit.design import Question
-from gcode2krl.gap.fit.gram import Gram
+from gcode2krl.gap.fit.gram import Gram, UsedColumns
 from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.fit.noise import white
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.fit.refitting import refit
 from gcode2krl.gap.fit.signatures import blocks_of
+from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.runs import Controller, Run, RunHead
 
 STEP_S = 0.02
@@ -212,3 +214,13 @@ def pair(inputs: Inputs | None = None, head: RunHead | None = None, number: int 
 def stub(**values) -> SimpleNamespace:
     """Return as much of an object as a function looks at."""
     return SimpleNamespace(**values)
+
+
+def split(columns, components) -> SplitColumns:
+    """Return columns (v, m) by stretches of rows that are of one component (v,)."""
+    edges = [0, *(np.flatnonzero(np.diff(components)) + 1).tolist(), len(columns)]
+    parts = [columns[first:last] for first, last in pairwise(edges)]
+    used = [np.flatnonzero(part.any(axis=0)) for part in parts]
+    return SplitColumns.of_parts(
+        [UsedColumns(part[:, at], at) for part, at in zip(parts, used, strict=True)], columns.shape[1]
+    )

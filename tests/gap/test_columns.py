@@ -6,7 +6,6 @@ from scipy.sparse import csr_array
 from gcode2krl.gap.families.columns import Beside, Columns
 from gcode2krl.gap.families.steps import Steps
 from gcode2krl.gap.families.view import View
-from gcode2krl.gap.fit.split_columns import SplitColumns
 from tests.gap import constructed as c
 from tests.gap.test_families import view_of
 
@@ -62,7 +61,7 @@ def test_views_of_one_component_may_keep_different_nuisance():
     members = csr_array(np.ones((1, count * joints)))
     nothing = np.zeros((count * joints, 0))
     components = np.repeat(np.arange(joints), count)
-    clock = SplitColumns.of_dense(rate[:, None], components)
+    clock = c.split(rate[:, None], components)
     plain = View(rate, nothing, clock, members, components)
     alike = plain.beside(rate, 50.0 * rate[:, None])
     assert plain.at(2).kept == ()

@@ -10,8 +10,7 @@ from gcode2krl.gap.choose import constancy
 from gcode2krl.gap.choose.constancy import constancy_of, spread_between_runs
 from gcode2krl.gap.choose.intervals import intervals_of
 from gcode2krl.gap.choose.selection import examine
-from gcode2krl.gap.fit.split_columns import SplitColumns
-from tests.gap.constructed import LINK, applied, examined, motion, noise, question, trace, wave
+from tests.gap.constructed import LINK, applied, examined, motion, noise, question, split, trace, wave
 from tests.gap.test_counted_once import examined as with_clocks
 from tests.gap.test_counted_once import late_encoders
 
@@ -102,7 +101,7 @@ def test_a_run_whose_own_zero_hides_the_effect_says_nothing_of_its_size():
     both = constancy._Residual(
         left=noise(400, 1)[:, 0],
         change=5.0 * step,
-        nuisance=SplitColumns.of_dense(zeros, np.repeat([0, 1], 200)),
+        nuisance=split(zeros, np.repeat([0, 1], 200)),
         run=np.repeat([0, 1], 200),
         time_s=np.tile(np.arange(200.0), 2),
         component=np.zeros(400),

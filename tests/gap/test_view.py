@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.box import MOST
 from gcode2krl.gap.fit.split_columns import SplitColumns
+from tests.gap.constructed import split
 
 COUNT = 300
 RATES = [np.sin(np.arange(COUNT) * (0.02 + 0.01 * joint)) for joint in range(6)]
@@ -46,7 +47,7 @@ def test_joints_with_usual_lags_of_their_own_let_the_clock_be_unsure():
     lags = np.zeros((6 * COUNT, 6))
     for joint in range(6):
         lags[joint * COUNT : (joint + 1) * COUNT, joint] = usual / MOST * RATES[joint]
-    nuisance = SplitColumns.of_dense(10.0 * lags, plain.components)
+    nuisance = split(10.0 * lags, plain.components)
     seen = replace(plain, nuisance=nuisance, tangents=10.0 * plain.tangents, residual=10.0 * plain.residual)
     assert seen.at(2).chi2 == pytest.approx(COUNT, rel=0.15)
 

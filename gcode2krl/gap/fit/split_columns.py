@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -40,15 +39,6 @@ class SplitColumns:
     """m"""
 
     __array_ufunc__ = None  # so that a product with an array on the left is that of this class
-
-    @classmethod
-    def of_dense(cls, columns: Floats, components: Ints) -> "SplitColumns":
-        """Return columns (v, m) by stretches of rows that are of one component (v,)."""
-        edges = [0, *(np.flatnonzero(np.diff(components)) + 1).tolist(), len(columns)]
-        parts = [columns[first:last] for first, last in pairwise(edges)]
-        used = [np.flatnonzero(part.any(axis=0)) for part in parts]
-        own = [UsedColumns(part[:, at], at) for part, at in zip(parts, used, strict=True)]
-        return cls.of_parts(own, columns.shape[1])
 
     @classmethod
     def of_parts(cls, columns: Iterable[UsedColumns], width: int) -> "SplitColumns":
