@@ -13,7 +13,6 @@ from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.fit.signatures import strongest_hz
 from tests.gap.constructed import Added, applied, motion, noise, pair, stub, trace
 
-COVERS = ("gcode2krl.gap.choose.candidates",)
 LIBRARY = library()
 
 

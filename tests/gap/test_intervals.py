@@ -15,8 +15,6 @@ from gcode2krl.gap.fit.noise import white
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import examined, motion, noise, question, refitted, trace, wave
 
-COVERS = ("gcode2krl.gap.beside.stretches",)
-
 
 def run_of(seconds, components=2, begins_s=0.0, rate_hz=4.0):
     """Return as much of a part as stretches are numbered by."""

@@ -23,12 +23,6 @@ from gcode2krl.gap.fit.noise import Noise, Slow
 from gcode2krl.gap.fit.nuisance import Nuisance
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-COVERS = (
-    "gcode2krl.gap.fit.clusters",
-    "gcode2krl.gap.fit.least_squares",
-    "gcode2krl.gap.fit.hooke_jeeves",
-)
-
 PRIOR = THRESHOLDS.fit.prior_sizes
 NOISE = (
     Noise(np.array([0.6, -0.2, 0.1]), 0.5, 0.7),

@@ -15,8 +15,6 @@ from gcode2krl.gap.fit.nuisance import nuisance_of
 from gcode2krl.gap.fit.signatures import Signatures
 from tests.gap.constructed import joint_rates, motion, trace
 
-COVERS = ("gcode2krl.gap.beside.instruments",)
-
 BOUNDS = Mismatch()
 LIBRARY = library()
 ROOT3 = np.sqrt(3.0)

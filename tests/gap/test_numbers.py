@@ -10,8 +10,6 @@ from gcode2krl.gap.fit.fitted import Fitted, Numbers
 from gcode2krl.gap.fit.numbers import free_of
 from tests.gap.constructed import trace
 
-COVERS = ("gcode2krl.gap.fit.fitted",)
-
 LIBRARY = library()
 PRIOR = 3.0
 """A size is expected within so many typical ones."""

@@ -15,7 +15,6 @@ from tests.gap.constructed import cell, controller, joints, pair
 from tests.gap.test_planning import prediction
 
 __all__ = ["prediction"]
-COVERS = ("gcode2krl.gap.beside.log_alone",)
 STAMPS_S = np.arange(0.0, 10.0, 0.004)
 OWN = np.radians(np.round(np.degrees(joints(STAMPS_S)), 4))
 LAST_DECIMAL_RAD = np.radians(1e-4)

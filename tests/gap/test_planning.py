@@ -10,7 +10,6 @@ from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.beside.planning import remembered_plan
 from gcode2krl.prediction import Prediction
 
-COVERS = ("gcode2krl.gap.beside.fine_prediction",)
 STEP_S = 0.004
 PROGRAM = "G21 G90 G17\nG54\nT1 M6\nS9000 M3\nG0 X0 Y0 Z30\nG1 X80 F6000\nG1 Y60\nG1 X10 Y20\nM30\n"
 

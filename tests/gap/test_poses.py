@@ -16,8 +16,6 @@ from gcode2krl.runs import load_run
 
 pytestmark = pytest.mark.slow
 
-COVERS = ("gcode2krl.gap.fit.pose_noise",)
-
 CELL = load_cell()
 POSES = 60
 SIGMA_MM = 0.02

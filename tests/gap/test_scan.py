@@ -14,7 +14,6 @@ from gcode2krl.gap.diagnosis import known_effects
 from gcode2krl.runs.scan import Scan
 from tests.gap.synthetic import prediction, refined, runs
 
-COVERS = ("gcode2krl.gap.choose.surface",)
 SHIFT_MM = np.array([0.03, -0.02, 0.15])
 
 

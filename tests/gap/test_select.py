@@ -12,7 +12,6 @@ from gcode2krl.gap.fit.likelihood import Likelihood
 from gcode2krl.gap.fit.noise import white
 from gcode2krl.gap.fit.nuisance import Nuisance
 
-COVERS = ("gcode2krl.gap.fit.gram",)
 COUNT, BLOCKS, STRETCHES = 2400, 25, 48
 
 

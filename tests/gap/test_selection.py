@@ -24,12 +24,6 @@ from tests.gap.constructed import (
     wave,
 )
 
-COVERS = (
-    "gcode2krl.gap.choose.mismatch",
-    "gcode2krl.gap.fit.design",
-    "gcode2krl.gap.choose.selection",
-)
-
 COUNT, SIGMA = 500, 1e-4
 TIME_S = motion().time_s
 SMALL, LARGE, ABSENT = wave(2.0), wave(3.0), wave(5.0)

@@ -16,8 +16,6 @@ from gcode2krl.gap.slips.program import other_program
 from gcode2krl.runs import Controller, Run
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 
-COVERS = ("gcode2krl.gap.beside.own_model",)
-
 FIRST, SECOND = PROGRAM.split("G0 X140 Y40\n")
 SHIFTED = f"{FIRST}G0 X140 Y42\n{SECOND.replace('Y60 F2400', 'Y62 F2400').replace('Y-40', 'Y-38')}"
 SLOW = PROGRAM.replace("F3000", "F1800").replace("F2400", "F1440").replace("F6000", "F3600")
