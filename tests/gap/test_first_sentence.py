@@ -40,14 +40,14 @@ def test_two_causes_and_a_rest_that_depends_on_something():
     assert headline(both) == (
         "The tip is off by 0.41 mm RMS: backlash of A2, 0.021 deg ± 0.002 and servo lag of A4. With them in "
         "the model 0.061 mm are left on data not used, the noise is 0.030 mm; more is left than noise "
-        "explains: a step at 11.2 s of run-1 and all later runs at the tip, 0.14 mm along (0.9, 0.3, 0.1)."
+        "explains: a step from 11.2 s of run-1 on at the tip, 0.14 mm along (0.9, 0.3, 0.1)."
     )
 
 
 def test_an_unexplained_gap_says_on_what_it_depends_and_what_it_may_be():
     assert headline(UNEXPLAINED) == (
-        "The tip is off by 0.41 mm RMS: no effect of the library explains it; it is a step at "
-        "11.2 s of run-1 and all later runs at the tip, 0.14 mm along (0.9, 0.3, 0.1)."
+        "The tip is off by 0.41 mm RMS: no effect of the library explains it; it is a step from "
+        "11.2 s of run-1 on at the tip, 0.14 mm along (0.9, 0.3, 0.1)."
     )
     assert headline(replace(UNEXPLAINED, causes=(UNSURE,))).endswith("; perhaps thermal (0.31).")
 

@@ -132,7 +132,7 @@ def test_why():
 def test_what_remains_and_the_next_run():
     text = words(parsed(UNEXPLAINED), "left")
     assert "0.412 mm RMS, with a noise floor of 0.0304 mm: more than noise explains." in text
-    assert "0.93 tip, a step at 11.2 s of run-1 and all later runs" in text
+    assert "0.93 tip, a step from 11.2 s of run-1 on" in text
     assert "force: needs force.csv" in text
     following = words(parsed(RICH), "next")
     assert "gcode2krl make-test reversals, 4 minutes" in following

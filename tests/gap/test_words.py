@@ -101,7 +101,7 @@ def test_lists_and_what_a_cause_cannot_be_told_from():
 
 def test_dependences():
     assert depends(STEP) == (
-        "tip, a step at 11.2 s of run-1 and all later runs, 0.14 mm along (0.9, 0.3, 0.1)"
+        "tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1)"
     )
     loop = replace(STEP, at="A2", on="own torque", form="loop", at_time_s=None, run=None, direction=None)
     assert depends(replace(loop, size=0.0123, unit="deg")) == "A2, a loop with own torque, 0.012 deg"
@@ -136,7 +136,7 @@ def test_a_tone_has_its_frequency_and_a_course_its_ends_and_its_bend():
 
 def test_dependences_within_a_sentence():
     assert what_there_is(replace(STEP, direction=None)) == (
-        "a step at 11.2 s of run-1 and all later runs at the tip, 0.14 mm"
+        "a step from 11.2 s of run-1 on at the tip, 0.14 mm"
     )
     places = {"A2": "in A2", "fx": "in the force", "timing": "in time"}
     for at, words in places.items():

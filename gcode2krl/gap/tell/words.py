@@ -155,12 +155,12 @@ def happened(event: EventResult) -> str:
 
 
 def depends(found: DependsOnResult) -> str:
-    """Return where a gap is and on what it depends: ``tip, a step at 11.2 s of run-1 and all later runs``."""
+    """Return where a gap is and on what it depends: ``tip, a step from 11.2 s of run-1 on``."""
     return ", ".join([_place(found), _form(found), *_size(found), *_course(found)])
 
 
 def what_there_is(found: DependsOnResult) -> str:
-    """Return the same within a sentence: ``a step at 11.2 s of run-1 and all later runs at the tip``."""
+    """Return the same within a sentence: ``a step from 11.2 s of run-1 on at the tip``."""
     place = _place(found)
     where = {"tip": "at the tip", "force": "in the force", "timing": "in time"}.get(place, f"in {place}")
     return ", ".join([f"{_form(found)} {where}", *_size(found)])
@@ -193,9 +193,8 @@ def _place(found: DependsOnResult) -> str:
 def _form(found: DependsOnResult) -> str:
     if found.form in ("step", "impulse") and found.at_time_s is not None:
         line = f", line {found.line}" if found.line else ""
-        later = " and all later runs" if found.form == "step" else ""
-        run = f" of {found.run}{line}{later}" if found.run else ""
-        return f"{'a' if found.form == 'step' else 'an'} {found.form} at {found.at_time_s:.1f} s{run}"
+        at = f"{found.at_time_s:.1f} s" + (f" of {found.run}{line}" if found.run else "")
+        return f"a step from {at} on" if found.form == "step" else f"an impulse at {at}"
     if found.frequency_hz is not None:
         return f"a tone of {number(found.frequency_hz)} Hz"
     return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
