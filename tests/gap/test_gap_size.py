@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.stats import norm, t
 
+from gcode2krl.gap.beside.events import command_changes
 from gcode2krl.gap.choose.gap_size import Size, size_of_gap
 from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, white
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
@@ -54,6 +55,21 @@ def test_an_instrument_noisier_than_stated_is_no_gap_by_its_size():
     assert size_of_gap([trace(y)], [[]], [replace(stated, beyond=0.0)], []).significant
     assert not size_of_gap([trace(y)], [[]], [stated], []).significant
     assert size_of_gap([trace(y + 3.0 * SINE[:, None])], [[]], [stated], []).significant
+
+
+@pytest.mark.parametrize(("in_step", "is_gap"), [(True, True), (False, False)])
+def test_what_is_loud_for_moments_is_a_gap_where_the_command_changes(in_step, is_gap):
+    y, inputs = noise(3000, 7, SIGMA), motion(60.0)
+    # joints that begin and end a way of a second, every seven seconds
+    since = np.clip(inputs.time_s % 7.0, 0.0, 1.0) + np.floor(inputs.time_s / 7.0)
+    inputs = replace(inputs, q_cmd_rad=inputs.q_cmd_rad[:1] + 0.02 * since[:, None])
+    at = np.flatnonzero(command_changes(trace(y, inputs=inputs)) == in_step)
+    assert 0.02 < len(at) / len(y) < 0.98
+    for row in at[:: len(at) // 20]:
+        y[row : row + 10] *= 5.0
+    found = size_of_gap([trace(y, inputs=inputs)], [[]], [white(SIGMA)], [])
+    assert found.calm_excess < 4.0 * found.deviation
+    assert found.significant == is_gap
 
 
 @pytest.mark.parametrize("height", [0.4, 4.0])

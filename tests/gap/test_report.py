@@ -59,8 +59,7 @@ def test_the_whole_report_line_by_line():
 
 def test_what_is_left_is_said_by_what_it_depends_on():
     assert list(left_lines(UNEXPLAINED)) == [
-        "0.93 tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1); takes 88% of "
-        "the gap"
+        "0.93 tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1); takes 88% of the gap"
     ]
     assert "what is left depends on" in text_report(UNEXPLAINED).splitlines()
     assert "what is left depends on" not in text_report(GAP)

@@ -100,9 +100,7 @@ def test_lists_and_what_a_cause_cannot_be_told_from():
 
 
 def test_dependences():
-    assert depends(STEP) == (
-        "tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1)"
-    )
+    assert depends(STEP) == ("tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1)")
     loop = replace(STEP, at="A2", on="own torque", form="loop", at_time_s=None, run=None, direction=None)
     assert depends(replace(loop, size=0.0123, unit="deg")) == "A2, a loop with own torque, 0.012 deg"
     assert depends(replace(loop, form="drift", on="wall clock", size=None)) == "A2, a drift with wall clock"

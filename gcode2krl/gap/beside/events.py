@@ -102,7 +102,7 @@ def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]])
     stretches = [list(_stretches(trace, rest)) for trace, rest in zip(traces, rests, strict=True)]
     if not any(stretches):
         return list(traces)
-    commanded = _in_step(traces, stretches, [_command_changes(trace) for trace in traces])
+    commanded = _in_step(traces, stretches, [command_changes(trace) for trace in traces])
     repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
     shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
     coincident = _in_step(traces, stretches, shared, least=1)
@@ -240,7 +240,7 @@ def _in_step(
     return [[False] * len(own) for own in stretches]
 
 
-def _command_changes(trace: Trace) -> Bools:
+def command_changes(trace: Trace) -> Bools:
     """Return the rows (n,) shortly after the command jerks, a joint turns back or the force jumps."""
     inputs = trace.inputs
     time_s = inputs.time_s

@@ -8,6 +8,10 @@ sqrt(sigma² + |N·b|²).
 (2/n)·Σ_k C(k)², C the autocovariance (Bartlett 1946): a slow part makes it large, few rows too. The spread of
 the means over stretches of time says the same without the model, but of few stretches roughly. Both are
 joined as scaled inverse chi2, and the excess is compared with a t distribution of their freedom (Smyth 2004).
+
+**What is loud for moments** is no part of that mean, since instruments have bursts and heavy tails. Where it
+is in step with the command it is none of theirs: of k loud moments so many fall by chance into the share of
+the time in which the command changes (binomial test), and their power must be a share of the noise's.
 """
 
 import functools
@@ -16,8 +20,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied
+from gcode2krl.gap.beside.events import command_changes
 from gcode2krl.gap.beside.stretches import stretches_of
 from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.fit.likelihood import Likelihood
@@ -32,6 +37,8 @@ _MAD_EFFICIENCY = 0.37
 """Of the median absolute deviation for normal values (Rousseeuw & Croux 1993)."""
 _MOST_LAGS = 2000
 """Over which the autocovariance is summed; a slow part has forgotten by then."""
+_MOMENT_ROWS, _LOUD = 12, 4.0
+"""Rows of a moment, and so many times the median moment's power is loud: of white noise one in 10^6."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +67,9 @@ class Size:
     """
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
+    loud_in_step: float = 0.0
+    """The power of loud moments in step with the command over that of the noise, in one component; 0 where
+    that they are in step may be chance."""
 
     @property
     def power(self) -> float:
@@ -70,7 +80,8 @@ class Size:
     def significant(self) -> bool:
         """Tell whether what is left is more than noise and mismatch."""
         loud = self.calm_excess > _as_many_deviations(self.freedom) * self.deviation
-        return loud or self.moments_off >= _LIMITS.model_off_rows
+        in_step = self.loud_in_step > _LIMITS.loud_share
+        return loud or in_step or self.moments_off >= _LIMITS.model_off_rows
 
     @property
     def share_left(self) -> float:
@@ -105,6 +116,7 @@ def pooled(sizes: Sequence[Size]) -> Size:
         calm_excess=mean([size.calm_excess for size in sizes]),
         freedom=sum(size.freedom for size in sizes),
         moments_off=sum(size.moments_off for size in sizes),
+        loud_in_step=max(size.loud_in_step for size in sizes),
     )
 
 
@@ -138,6 +150,7 @@ def size_of_gap(
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
+        loud_in_step=_loud_in_step(traces, structured, noise),
     )
 
 
@@ -153,6 +166,42 @@ def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequen
         for trace, rest in zip(traces, left, strict=True)
     )
     return sum(int(np.count_nonzero(rows.any(axis=1))) for rows in beyond)
+
+
+def _loud_in_step(traces: Sequence[Trace], left: Sequence[Floats], noise: Sequence[Noise]) -> float:
+    """Return the largest power of a component's loud moments in step with the command over its noise's."""
+    if traces[0].link.model_rms or traces[0].still:
+        return 0.0
+    changes = [_by_moments(command_changes(each).astype(np.float64), each) for each in traces]
+    is_changing, shares = np.concatenate(changes).any(axis=1), [0.0]
+    for j, component in enumerate(noise):
+        rows = [
+            _by_moments(component.whiten(rest[:, [j]], trace.segments)[:, 0], trace)
+            for rest, trace in zip(left, traces, strict=True)
+        ]
+        power = np.mean(np.concatenate(rows) ** 2, axis=1)
+        shares.append(_share_in_step(power, is_changing, len(noise)))
+    return max(shares)
+
+
+def _by_moments(values: Floats, trace: Trace) -> Floats:
+    """Return values (n,) of a trace by moments (w, rows), those of each segment by themselves."""
+    whole = [(first, last - (last - first) % _MOMENT_ROWS) for first, last in trace.segments]
+    return np.concatenate([values[first:last] for first, last in whole]).reshape(-1, _MOMENT_ROWS)
+
+
+def _share_in_step(power: Floats, changes: Bools, components: int) -> float:
+    """Return the power of loud moments where the command changes (w,) over that of all; 0 if by chance."""
+    from scipy.special import bdtrc
+
+    usual = float(np.median(power)) if len(power) else 0.0
+    loud = power > _LOUD * usual
+    here = loud & changes
+    count = int(np.count_nonzero(here))
+    if usual == 0.0 or count < THRESHOLDS.beside.in_step_least:
+        return 0.0
+    chance = components * bdtrc(count - 1, np.count_nonzero(loud), float(np.mean(changes)))
+    return float(np.sum(power[here] - usual)) / (usual * len(power)) if chance < _LIMITS.loud_p else 0.0
 
 
 def _less(values: Sequence[Floats], others: Sequence[Floats]) -> list[Floats]:
