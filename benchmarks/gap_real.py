@@ -85,13 +85,13 @@ def diagnosed(logs: Sequence[Log], parent: Path) -> Gap:
 
 
 def made_up_logs() -> list[Log]:
-    """Return three logs of 10 s: all joints swing, load encoders are 3 ms late and see 0.02 deg a kN·m.
+    """Return two logs of 10 s: all joints swing, load encoders are 3 ms late and see 0.02 deg a kN·m.
 
     They try this program where nobody has fetched the recorded ones.
     """
     time_s = np.arange(0.0, 10.0, 0.004)
     logs = []
-    for number in range(1, 4):
+    for number in range(1, 3):
         generator = np.random.default_rng(number)
         hz, deg = generator.uniform(0.1, 0.5, 6), generator.uniform(10.0, 40.0, 6)
         phase = generator.uniform(0.0, 2.0 * np.pi, 6)

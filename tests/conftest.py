@@ -1,5 +1,6 @@
 """What all tests share: the checkout's folders and a way to run the command line in-process."""
 
+import gc
 import hashlib
 import os
 import signal
@@ -22,11 +23,27 @@ def pytest_xdist_auto_num_workers(config):
     return None if any(path.is_dir() for path in named) else 0
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Ten thousand tests stay to the end: the collector of garbage need not look at them time and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_configure(config):
     """Several processes run at once, so linear algebra needs only one thread in each."""
     if getattr(config.option, "numprocesses", None):
         for library in ("OMP", "OPENBLAS", "MKL"):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def draws(count):
+    """So many random cases; `GCODE2KRL_DRAWS=10 python -m pytest -m slow` draws ten times as many."""
+    return max(1, round(count * float(os.environ.get("GCODE2KRL_DRAWS", "1"))))
 
 
 def _heed_ctrl_c():

@@ -9,6 +9,7 @@ from gcode2krl.cli.main import commands
 from tests.cli.test_help_examples import LINES, ready  # noqa: F401 (a fixture)
 from tests.conftest import ROOT
 from tests.documented_commands import Named, is_mention, named, script_of
+from tests.test_ci import IN_TESTS
 from tests.test_documents import DOCUMENTS, ELSEWHERE, folder  # noqa: F401 (a fixture)
 
 LISTED = tomllib.loads((ROOT / "tests" / "documented_commands.toml").read_text(encoding="utf-8"))
@@ -29,7 +30,9 @@ MENTIONS = sorted({each.command for each in NAMED if is_mention(each.command, co
 
 def runs_in_ci(command: str) -> bool:
     script = script_of(command)
-    return script is not None and re.search(rf"^(bench|python) {re.escape(script)}\b", CI, re.M) is not None
+    if script is None:
+        return False
+    return script in IN_TESTS or re.search(rf"^python {re.escape(script)}\b", CI, re.M) is not None
 
 
 def test_every_command_is_run_or_listed():

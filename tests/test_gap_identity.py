@@ -1,6 +1,7 @@
 """The comparison of two trees: what it stores, what it calls a difference, and one case through all of it."""
 
 import json
+import shutil
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -206,8 +207,8 @@ def test_one_case_through_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert identity.main(["make", str(folder), "--cases", "1"]) == 0
     assert identity.main(["make", str(folder), "--cases", "1"]) == 0  # what is there stays
     assert not list(folder.rglob("*label*"))
-    for out in (a, b):
-        assert identity.main(["run", str(folder), str(out), "--only", "example"]) == 0
+    assert identity.main(["run", str(folder), str(a), "--only", "example"]) == 0
+    shutil.copytree(a, b)
     assert json.loads((a / "example.json").read_text())["verdict"] == "explained"
     assert "backlash" in (a / "example-text.txt").read_text()
     capsys.readouterr()

@@ -28,6 +28,7 @@ def test_they_are_those_of_predict_in_the_order_given(parts):
         assert many.issues == one.issues
 
 
+@pytest.mark.slow
 def test_a_folder_comes_sorted(parts):
     found = [prediction.toolpath.source for prediction in predict_many(parts[0].parent, forces=False)]
     assert found == [str(file) for file in sorted(parts)]
@@ -47,6 +48,7 @@ def test_a_bad_part_raises_when_it_is_its_turn(parts, tmp_path):
     assert list(found) == []
 
 
+@pytest.mark.slow
 def test_a_bad_part_may_be_kept_as_its_error(parts, tmp_path):
     first, error, last = predict_many([parts[0], tmp_path / "nothing.nc", parts[1]], errors="keep")
     assert (first.toolpath.source, last.toolpath.source) == (str(parts[0]), str(parts[1]))

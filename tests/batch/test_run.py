@@ -78,6 +78,7 @@ def test_an_output_that_cannot_be_written_is_a_failure_of_its_part(parts, tmp_pa
     assert found["z.nc"]["exit_code"] == 0
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_costs_only_time(parts, tmp_path):
     (tmp_path / "file").write_text("")
     found = batch(parts, tmp_path / "out", Cache(tmp_path / "file" / "cache", 10**9))

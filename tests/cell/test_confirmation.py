@@ -18,7 +18,7 @@ from gcode2krl.cell.fingerprint import section_of, values_by_section
 from gcode2krl.cell.signature_text import with_signature, without_signature
 from gcode2krl.errors import NotUnderstoodError
 from tests.cells import OWN_CELL, signed
-from tests.conftest import ROOT
+from tests.conftest import ROOT, draws
 
 EXAMPLES = sorted((ROOT / "examples" / "cells").glob("*.toml"))
 PART = (ROOT / "examples" / "cells" / "part.nc").read_text()
@@ -178,14 +178,15 @@ def test_an_edited_value_unconfirms_its_section_and_is_named(example, models, ru
 
 
 @pytest.mark.slow
-def test_a_hundred_drawn_edits(example, models, run, tmp_path):
-    edits = draw(100, example, models, run, tmp_path, seed=2)
+def test_many_drawn_edits(example, models, run, tmp_path):
+    count = draws(40)
+    edits = draw(count, example, models, run, tmp_path, seed=2)
     places = {where: sum(edit.where == where for edit in edits) for where in ("cell", "base", "library")}
     sections = {section_of(edit.key) for edit in edits}
     print(f"{len(edits)} edits, {len(edits)} programs with HALT; {places}, {len(sections)} sections")
-    assert len(edits) == 100
-    assert min(places.values()) >= 5
-    assert len(sections) >= 15
+    assert len(edits) == count
+    assert min(places.values()) >= 2
+    assert len(sections) >= 12
 
 
 WHO = "confirmed by N. N. on 2026-11-28"

@@ -91,7 +91,7 @@ def written(tree, blanks):
     return "\n".join(lines)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(TREES, st.integers(0, 2))
 def test_any_file(tree, blanks):
     text = written(tree, blanks)

@@ -82,7 +82,7 @@ def cells(draw):
 
 
 @given(made=cells())
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_every_value_of_the_program_was_stated(made):
     data, dropped, number, outputs = made
     with TemporaryDirectory() as folder:

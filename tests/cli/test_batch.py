@@ -175,6 +175,7 @@ def test_an_option_a_cell_and_its_mesh_count(parts, run, tmp_path):
     assert again() == set()
 
 
+@pytest.mark.slow
 def test_an_output_that_was_changed_or_lost_is_put_back(parts, run):
     run("batch", parts, "-o", "out")
     before = programs("out")
@@ -380,6 +381,7 @@ def test_ctrl_c_leaves_what_is_finished_and_the_next_call_goes_on(parts, run, tm
     assert programs("out") == programs("undisturbed")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="sends the signal of Ctrl-C")
 def test_ctrl_c_after_the_last_part_does_not_cost_the_results(parts, run, monkeypatch):
     wrote = results.write_results

@@ -318,7 +318,7 @@ def solid(tool, length_mm=60.0, count=256):
 
 @pytest.mark.parametrize(
     "tool",
-    [FLAT, BALL, *(pytest.param(tool, marks=pytest.mark.slow) for tool in (BULL, TAPERED, DRILL))],
+    [FLAT, *(pytest.param(tool, marks=pytest.mark.slow) for tool in (BALL, BULL, TAPERED, DRILL))],
     ids=lambda tool: tool.kind,
 )
 def test_volume_against_exact_booleans(tool):

@@ -12,6 +12,7 @@ import pytest
 
 from gcode2krl import Gcode2KrlError, load_cell
 from gcode2krl.gcode import read_stream
+from tests.conftest import draws
 
 ROOT = Path(__file__).parents[2]
 RS274, POSTS = ROOT / "tests" / "reference" / "rs274", ROOT / "tests" / "reference" / "posts"
@@ -387,14 +388,14 @@ def test_what_is_a_comment_says_the_control(dialect, line, is_read, tmp_path):
 
 @pytest.mark.slow
 def test_a_comment_anywhere_changes_nothing_or_is_refused(reference_programs, capsys):
-    count = sum(
-        check_each_place(program, number, line)
-        for program in reference_programs
-        for number, line in lines_of_code(program)
-    )
+    places = [(program, *line) for program in reference_programs for line in lines_of_code(program)]
+    sample = random.Random(6).sample(places, min(len(places), draws(len(places) // 5)))
+    count = sum(check_each_place(*place) for place in sample)
     with capsys.disabled():
-        print(f"\n{count} comments in {len(reference_programs)} programs: 0 differences")
-    assert count > 40_000
+        print(
+            f"\n{count} comments in {len(sample)} lines of {len(reference_programs)} programs: 0 differences"
+        )
+    assert count > 8_000
 
 
 # --- beside LinuxCNC itself -------------------------------------------------------------------------------

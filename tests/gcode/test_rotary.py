@@ -166,8 +166,18 @@ def way_of_block(toolpath, line):
     return np.append(rows[0] - 1, rows)
 
 
-@pytest.mark.parametrize("kind", ["head-head", "table-table", "table-head"])
-@pytest.mark.parametrize("tcpm", [True, False])
+@pytest.mark.parametrize(
+    ("kind", "tcpm"),
+    [
+        ("head-head", True),
+        ("table-table", False),
+        ("table-head", True),
+        *(
+            pytest.param(kind, tcpm, marks=pytest.mark.slow)
+            for kind, tcpm in (("head-head", False), ("table-table", True), ("table-head", False))
+        ),
+    ],
+)
 def test_chords_follow_the_machine_within_tolerance(kind, tcpm):
     made_for = machine(kind, tcpm=tcpm)
     first, second = made_for.axes

@@ -70,11 +70,10 @@ def turning_trace(text, cell, controller, vel_ori, acc_ori, seed=3):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["averages", "trapezoid"])
-def test_turning_lines_give_the_limits_of_orientation(text, cell, law):
-    slow = {"vel_ori_deg_s": 30.0, "acc_ori_deg_s2": 150.0, "law": law}
+def test_turning_lines_give_the_limits_of_orientation(text, cell):
+    slow = {"vel_ori_deg_s": 30.0, "acc_ori_deg_s2": 150.0, "law": "trapezoid"}
     own = cell.model_copy(update={"controller": cell.controller.model_copy(update=slow)})
-    trace = turning_trace(text, cell, Controller(law=law), vel_ori=24.0, acc_ori=110.0)
+    trace = turning_trace(text, cell, Controller(law="trapezoid"), vel_ori=24.0, acc_ori=110.0)
     found = identify_controller(trace, controller_test_targets(own), own)
     assert found.vel_ori_deg_s.value == pytest.approx(24.0, rel=1e-3)
     assert found.acc_ori_deg_s2.value == pytest.approx(110.0, rel=5e-3)
@@ -164,7 +163,7 @@ def test_program_elsewhere_and_slower(run, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("k_cycles", "cdis_mm", "law"),
-    [(14, 5.0, "averages"), (8, 2.3, "trapezoid"), (20, 11.0, "averages"), (11, 7.5, "trapezoid")],
+    [(14, 5.0, "averages"), (8, 2.3, "trapezoid"), (20, 11.0, "averages")],
 )
 def test_recovers_k_cdis_and_law(targets, text, cell, k_cycles, cdis_mm, law):
     truth = Controller(k_cycles * 0.012, cdis_mm, law)

@@ -8,6 +8,7 @@ import pytest
 from gcode2krl import write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.pilot import read_pilot
+from tests.conftest import draws
 from tests.krl.brute_replay import Law, replay
 from tests.krl.conftest import read
 from tests.krl.forces import cutting_below, moved, with_forces
@@ -118,7 +119,7 @@ class Case:
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(12), *(pytest.param(k, marks=pytest.mark.slow) for k in range(12, 120))]
+    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 8 + draws(40)))]
 )
 def test_leads_of_generated_programs(tmp_path, seed):
     """Several cells, both forms, with steps of the force and without."""

@@ -19,6 +19,7 @@ from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.restart import restarted
 from gcode2krl.tables import Targets
 from tests.cells import over_demonstration
+from tests.conftest import draws
 from tests.krl.conftest import read
 from tests.krl.execution import Cancelled, Controller, Halt, Run, execute, judge
 from tests.krl.language import EXTERNAL_KEYS, Program, parse_program
@@ -229,7 +230,7 @@ def assert_as_planned(intended: Run, targets, cell) -> None:
             assert blend == pytest.approx(targets.cdis_mm[row], abs=1e-3)
 
 
-def draws(first: int, count: int, folder) -> Iterator[tuple[int, list]]:
+def outcomes(first: int, count: int, folder) -> Iterator[tuple[int, list]]:
     """Yield seeds and what went wrong; refused draws are passed over, but may not be most."""
     refused = 0
     for seed in range(first, first + count):
@@ -244,7 +245,7 @@ def draws(first: int, count: int, folder) -> Iterator[tuple[int, list]]:
 
 
 def assert_none_wrong(first: int, count: int, folder) -> None:
-    wrong = {seed: reached for seed, reached in draws(first, count, folder) if reached}
+    wrong = {seed: reached for seed, reached in outcomes(first, count, folder) if reached}
     reasons = Counter(reason for reached in wrong.values() for reason in reached[0].reasons)
     told = [f"seed {seed}: {reached[0]}" for seed, reached in list(wrong.items())[:10]]
     head = f"{len(wrong)} of {count} programs go wrong unguarded, their first motion in {dict(reasons)}"
@@ -257,6 +258,6 @@ def test_no_wrong_target_amid_hostile_subprograms(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("first", range(1000, 2000, 250))
-def test_no_wrong_target_in_a_thousand_draws(first, tmp_path):
-    assert_none_wrong(first, 250, tmp_path)
+@pytest.mark.parametrize("first", [1000, 2000])
+def test_no_wrong_target_in_many_draws(first, tmp_path):
+    assert_none_wrong(first, draws(125), tmp_path)

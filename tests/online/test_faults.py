@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import draws
+
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 faults = import_module("online_faults")
 
@@ -27,7 +29,7 @@ def test_no_fault_in_any_state_makes_a_step():
 
 @pytest.mark.slow
 def test_no_fault_in_any_state_makes_a_step_in_many_cycles():
-    report = faults.drive(250_000, seed=11)
+    report = faults.drive(draws(40_000), seed=11)
     check(report)
     met = {(phase.value, name) for phase in faults.PHASES for name in faults.FAULTS}
     assert len(met & report.met) > 0.95 * len(met)
