@@ -8,7 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.program import between, smooth_spin, straight, tool_rotation
+from gcode2krl.pose.path import between
+from gcode2krl.pose.spin import smooth_spin, tool_rotation
+from gcode2krl.program.targets import straight
+from tests.pose.judging import judge_by
 
 angles = st.floats(-2 * np.pi, 2 * np.pi)
 components = st.floats(-1, 1)
@@ -84,8 +87,12 @@ def test_no_rows():
 PATH = np.column_stack([np.linspace(0, 2000, 201), np.zeros(201), np.zeros(201)])
 
 
+def spin_of(margin, position=PATH, is_target=None):
+    return smooth_spin(position, judge_by(margin), None, is_target)
+
+
 def around(centre_of, width_rad):
-    """Return a quality of two branches: 1 at a centre that may move with the row, 0 at its width."""
+    """Return a margin of two branches: 1 at a centre that may move with the row, 0 at its width."""
 
     def quality(rows, spin):
         off = np.abs(np.angle(np.exp(1j * (spin - centre_of(rows)))))
@@ -96,18 +103,18 @@ def around(centre_of, width_rad):
 
 
 def test_zero_where_zero_is_good():
-    assert smooth_spin(PATH, around(lambda rows: np.zeros(len(rows)), np.pi)) == pytest.approx(0)
+    assert spin_of(around(lambda rows: np.zeros(len(rows)), np.pi)) == pytest.approx(0)
 
 
 @pytest.mark.parametrize("centre_deg", [-150, -40, 60, 175])
 def test_constant_where_a_constant_will_do(centre_deg):
-    spin = smooth_spin(PATH, around(lambda rows: np.full(len(rows), np.radians(centre_deg)), np.radians(30)))
+    spin = spin_of(around(lambda rows: np.full(len(rows), np.radians(centre_deg)), np.radians(30)))
     assert isinstance(spin, float)
     assert abs(np.degrees(spin) - centre_deg) <= 0.7 * 30
 
 
 def test_smallest_turn_wins_a_tie():
-    assert smooth_spin(PATH, lambda rows, spin: np.ones((len(rows), 2))) == pytest.approx(0)
+    assert spin_of(lambda rows, spin: np.ones((len(rows), 2))) == pytest.approx(0)
 
 
 def test_changes_slowly_where_no_constant_will_do():
@@ -117,7 +124,7 @@ def test_changes_slowly_where_no_constant_will_do():
         return np.radians(120) * PATH[rows, 0] / 2000
 
     quality = around(wanders, np.radians(25))
-    spin = smooth_spin(PATH, quality)
+    spin = spin_of(quality)
     assert np.shape(spin) == (201,)
     rows = np.arange(201)
     worst = min(quality(rows[k : k + 1], spin[k])[0, 0] for k in rows)
@@ -130,7 +137,7 @@ def test_between_targets_the_angle_is_on_the_way_from_one_to_the_other():
     centre_deg = np.array([0.0, 10.0, 70.0, 75.0, 80.0])  # at 0, 500, 1000, 1500, 2000 mm
     is_target = np.array([True, False, False, False, True])
     width = np.radians(42)
-    spin = smooth_spin(PATH[::50], around(lambda rows: np.radians(centre_deg)[rows], width), None, is_target)
+    spin = spin_of(around(lambda rows: np.radians(centre_deg)[rows], width), PATH[::50], is_target)
     assert np.shape(spin) == (5,)
     assert np.allclose(np.diff(spin), np.diff(spin)[0])
     apart = np.abs(np.degrees(spin) - centre_deg)
@@ -185,16 +192,16 @@ def test_no_line_leads_through_home_or_to_another_tool():
 def test_a_point_out_of_reach_does_not_make_the_others_worse():
     """No angle is possible in the last row: that which is good in all the others is taken."""
     good = around(lambda rows: np.full(len(rows), np.radians(100.0)), np.radians(30))
-    spin = smooth_spin(PATH, lambda rows, spin: np.where(rows[:, None] == 200, -1.0, good(rows, spin)))
+    spin = spin_of(lambda rows, spin: np.where(rows[:, None] == 200, -1.0, good(rows, spin)))
     assert np.abs(np.degrees(spin) - 100.0).max() <= 15.0
 
 
 def test_a_single_position():
-    assert smooth_spin(PATH[:1], around(lambda rows: np.full(len(rows), 1.0), 0.5)) == pytest.approx(
+    assert spin_of(around(lambda rows: np.full(len(rows), 1.0), 0.5), PATH[:1]) == pytest.approx(
         1.0, abs=0.36
     )
 
 
 def test_impossible_everywhere_is_still_a_number():
-    spin = smooth_spin(PATH, lambda rows, spin: np.full((len(rows), 8), -1.0))
+    spin = spin_of(lambda rows, spin: np.full((len(rows), 8), -1.0))
     assert np.isfinite(spin).all()
