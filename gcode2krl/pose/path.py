@@ -41,12 +41,12 @@ class Between:
 
         Where two targets have opposite ones, nothing is between: the first one counts.
         """
-        found = self.of(values)
-        if found.strides[0] == 0 or len(found) == len(values):
-            return found
-        length = np.linalg.norm(found, axis=1, keepdims=True)
+        vectors = self.of(values)
+        if vectors.strides[0] == 0 or len(vectors) == len(values):
+            return vectors
+        length = np.linalg.norm(vectors, axis=1, keepdims=True)
         has_none = length < _NO_DIRECTION
-        return np.asarray(np.where(has_none, values[self.before], found / np.where(has_none, 1.0, length)))
+        return np.asarray(np.where(has_none, values[self.before], vectors / np.where(has_none, 1.0, length)))
 
     def rotations(self, values: Floats) -> Floats:
         """Return the quaternions (d, 4) of the points, those (p, 4) of the targets as `of`."""

@@ -108,8 +108,8 @@ def quality_of(poses: Poses, cell: Cell) -> Quality:
 
     in_chunks(solve, chunk_borders(count, _ROWS))
     external = None if poses.external is None else np.repeat(poses.external, 8, axis=0)
-    found = quality_at(q_rad.reshape(-1, 6), np.repeat(poses.tool, 8), external, cell)
-    return found.map(lambda column: column.reshape(count, 8))
+    flat = quality_at(q_rad.reshape(-1, 6), np.repeat(poses.tool, 8), external, cell)
+    return flat.map(lambda column: column.reshape(count, 8))
 
 
 def quality_at(q_rad: Floats, tool: Ints32, external: Floats | None, cell: Cell) -> Quality:

@@ -23,8 +23,6 @@ from gcode2krl.units import RAD_PER_DEG
 _SAME_HEIGHT_MM = 1e-6
 _ROUNDING = 1e-3
 """The last decimal of an external axis in the program's text."""
-
-
 _TRIED_SPINS_RAD = np.arange(-180.0, 180.0, 30.0) * RAD_PER_DEG
 """Turns about the tool axis of which the best one counts at a place, where the turn is searched."""
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gcode2krl.pose.path import between
-from gcode2krl.pose.spin import smooth_spin, tool_rotation
+from gcode2krl.pose.quality import Judge, Quality
+from gcode2krl.pose.spin import smooth_spin, stiffest_spin, tool_rotation
 from gcode2krl.program.targets import straight
 from tests.pose.judging import judge_by
 
@@ -60,22 +61,15 @@ def test_a_spin_for_each_row(rows):
     assert tool_rotation(axis, spin) == pytest.approx(np.array(one_by_one), abs=1e-9)
 
 
-def test_three_axes_have_no_rotation():
-    axis = np.broadcast_to(UP, (4, 3))
-    assert tool_rotation(axis, 0.0) == pytest.approx(np.tile([0, 0, 0, 1.0], (4, 1)), abs=0)
-
-
-@pytest.mark.parametrize("spin_deg", [-180, -30, 0, 90, 360])
-def test_three_axes_turn_about_z(spin_deg):
-    found = Rotation.from_quat(tool_rotation(UP[None], np.radians(spin_deg)))
-    assert (found * Rotation.from_euler("z", -spin_deg, degrees=True)).magnitude() == pytest.approx(
-        0, abs=1e-9
-    )
-
-
-def test_upside_down():
-    found = Rotation.from_quat(tool_rotation(-UP[None], 0.0))
-    assert found.as_matrix()[0] == pytest.approx(np.diag([1, -1, -1]), abs=1e-12)
+@pytest.mark.parametrize(
+    ("axis", "spin_deg", "abc_deg"),
+    [(UP, 0, (0, 0, 0)), (-UP, 0, (0, 0, 180)), *((UP, deg, (deg, 0, 0)) for deg in (-180, -30, 90, 360))],
+)
+def test_upright_and_upside_down(axis, spin_deg, abc_deg):
+    """All rows alike: the upright frame is turned about z alone, upside down it is that turned about x."""
+    turned = Rotation.from_quat(tool_rotation(np.broadcast_to(axis, (4, 3)), np.radians(spin_deg)))
+    off = turned * Rotation.from_euler("ZYX", abc_deg, degrees=True).inv()
+    assert off.magnitude() == pytest.approx(np.zeros(4), abs=1e-9)
 
 
 def test_no_rows():
@@ -100,10 +94,6 @@ def around(centre_of, width_rad):
         return np.stack([good, np.full(len(rows), -1.0)], axis=1)
 
     return quality
-
-
-def test_zero_where_zero_is_good():
-    assert spin_of(around(lambda rows: np.zeros(len(rows)), np.pi)) == pytest.approx(0)
 
 
 @pytest.mark.parametrize("centre_deg", [-150, -40, 60, 175])
@@ -203,5 +193,37 @@ def test_a_single_position():
 
 
 def test_impossible_everywhere_is_still_a_number():
-    spin = spin_of(lambda rows, spin: np.full((len(rows), 8), -1.0))
-    assert np.isfinite(spin).all()
+    assert np.isfinite(spin_of(lambda rows, spin: np.full((len(rows), 8), -1.0)))
+
+
+def test_a_turn_that_hits_is_taken_before_one_out_of_reach():
+    """The arm reaches between 80 and 120 degrees only, and hits something throughout."""
+
+    def quality(rows, spin):
+        reachable = np.full((len(rows), 8), abs(np.degrees(spin) - 100.0) <= 20.0)
+        return Quality(reachable, reachable, np.where(reachable, 0.4, 0.0))
+
+    short = smooth_spin(PATH[:2], Judge(quality))
+    assert abs(np.degrees(short) - 100.0) <= 20.0
+
+
+@pytest.mark.parametrize(("softest_deg", "wanted_deg"), [(0.0, 90.0), (60.0, -50.0), (-60.0, 50.0)])
+def test_the_stiffest_turn_keeps_off_what_is_hardly_reached(softest_deg, wanted_deg):
+    """Bending falls with the distance from a turn; margins are above 0.15 within 90 or 50 degrees of zero."""
+    within_deg = 90.0 if softest_deg == 0.0 else 50.0
+
+    def margin(rows, spin):
+        return np.full((len(rows), 2), 0.2 if abs(np.degrees(spin)) < within_deg + 1.0 else 0.14)
+
+    def bending(rows, spin):
+        return np.full((len(rows), 2), 2.0 - abs(np.degrees(spin) - softest_deg) / 360.0)
+
+    spin = stiffest_spin(PATH, judge_by(margin, bending))
+    assert abs(np.degrees(spin)) == pytest.approx(abs(wanted_deg))
+    assert softest_deg == 0.0 or np.degrees(spin) == pytest.approx(wanted_deg)
+
+
+def test_where_no_turn_is_stiff_and_reached_the_smooth_one_is_taken():
+    margin = around(lambda rows: np.full(len(rows), 1.0), 0.5)
+    judge = judge_by(lambda rows, spin: 0.1 * margin(rows, spin), lambda rows, spin: np.ones((len(rows), 2)))
+    assert stiffest_spin(PATH, judge) == smooth_spin(PATH, judge)

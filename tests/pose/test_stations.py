@@ -5,12 +5,14 @@ import pytest
 
 from gcode2krl.pose.along import following_deg, knots_through, taut
 from gcode2krl.pose.path import spread
+from gcode2krl.pose.quality import Quality
 from gcode2krl.pose.stations import (
     GOOD,
     LEAST,
     MOST_THAT_BEND,
     Range,
     best_place,
+    cost_of_places,
     plan_stations,
     quality_table,
     tried_places,
@@ -47,6 +49,15 @@ def softer_away_from(x, side_mm):
         return np.tile((1.0 + off)[:, None], (1, 8))
 
     return bending
+
+
+def test_worse_places_cost_more():
+    """Out of reach, a hit, a nearer hit, hardly reached, reached, good."""
+    reachable = np.array([[False, True, True, True, True, True]])
+    collides = np.array([[False, True, True, False, False, False]])
+    cost = cost_of_places(Quality(reachable, collides, np.array([[0.0, 0.1, 0.4, 0.04, 0.1, GOOD]])))
+    assert (np.diff(cost[0]) < 0.0).all()
+    assert cost[0, -1] == 0.0
 
 
 def test_one_station_where_one_is_enough():
