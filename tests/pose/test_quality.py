@@ -80,25 +80,9 @@ def test_a_post_beside_a_long_move_turns_it(tmp_path):
 
 def test_what_stands_between_two_cuts_does_not_turn_it_where_home_is_between(tmp_path):
     """The tool never goes along the line from one cut to the other."""
-    lines = [
-        "G21 G90 G17",
-        "T1 M6",
-        "S8000 M3",
-        "G0 X0 Y-400 Z20",
-        "G43 H1 Z20",
-        "G1 Z-1 F500",
-        "G1 X10 F2000",
-    ]
-    lines += [
-        "G0 Z20",
-        "G28 Z0",
-        "G28 X0 Y0",
-        "G0 X0 Y400 Z20",
-        "G1 Z-1 F500",
-        "G1 X10 F2000",
-        "G0 Z20",
-        "M30",
-    ]
+    lines = ["G21 G90 G17", "T1 M6", "S8000 M3", "G0 X0 Y-400 Z20", "G43 H1 Z20", "G1 Z-1 F500"]
+    lines += ["G1 X10 F2000", "G0 Z20", "G28 Z0", "G28 X0 Y0", "G0 X0 Y400 Z20", "G1 Z-1 F500"]
+    lines += ["G1 X10 F2000", "G0 Z20", "M30"]
     file = tmp_path / "two.nc"
     file.write_text("\n".join(lines) + "\n")
     low = box("post", [-260.0, -60, 60], [-190, 60, 330])
