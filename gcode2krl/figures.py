@@ -98,12 +98,13 @@ def _joints(prediction: Prediction) -> "Figure":
 
 
 def _spin(prediction: Prediction) -> "Figure":
-    from gcode2krl.clearance import spin_map
+    from gcode2krl.pose import spin_map
     from gcode2krl.report.spins import spin_map_figure
 
     assert prediction.motion is not None
     assert prediction.joints is not None
-    return spin_map_figure(*spin_map(prediction.motion, prediction.joints, prediction.cell))
+    seen = spin_map(prediction.motion, prediction.joints, prediction.cell)
+    return spin_map_figure(seen.path_mm, seen.spin_rad, seen.chosen_rad, *seen.quality)
 
 
 def _force(prediction: Prediction) -> "Figure":

@@ -23,10 +23,10 @@ from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.identify import trial_program
+from gcode2krl.pose import posed_targets
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast, LargestLoads, load_figures
 from gcode2krl.progress import Begin, Progress, unheard, unseen
-from gcode2krl.redundancy import posed_targets
 from gcode2krl.tables import (
     Clearance,
     Deflection,

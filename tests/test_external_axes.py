@@ -354,14 +354,14 @@ def test_clearances_along_a_moving_rail_are_those_of_the_poses(tmp_path):
 
 
 def test_the_map_of_turns_is_that_of_the_arm_where_it_stands(tmp_path):
-    from gcode2krl.clearance import spin_map
+    from gcode2krl.pose import spin_map
 
     cell = rail_cell()
     prediction = predict(long_cut(tmp_path), cell, forces=False)
     seen = spin_map(prediction.motion, prediction.joints, cell)
     chosen = int(np.argmin(np.abs(seen.spin_rad)))
     assert np.abs(seen.chosen_rad).max() < 1e-9
-    assert (seen.comfort[chosen] > 0.0).all()
+    assert (seen.quality.free_margin()[chosen] > 0.0).all()
 
 
 @pytest.mark.parametrize(

@@ -4,21 +4,17 @@ from gcode2krl.clearance.arm_in_stock import ArmInStock, Inside
 from gcode2krl.clearance.beside import collisions_beside, watch_of
 from gcode2krl.clearance.meshes import obstacle_meshes
 from gcode2krl.clearance.retracts import collisions_on_retracts
-from gcode2krl.clearance.spins import SpinMap, freedom, spin_map
 from gcode2krl.clearance.ways import Beside, moves_watched_at_targets, shown_otherwise, ways_beside
 
 __all__ = [
     "ArmInStock",
     "Beside",
     "Inside",
-    "SpinMap",
     "collisions_beside",
     "collisions_on_retracts",
-    "freedom",
     "moves_watched_at_targets",
     "obstacle_meshes",
     "shown_otherwise",
-    "spin_map",
     "watch_of",
     "ways_beside",
 ]

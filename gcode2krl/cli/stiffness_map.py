@@ -156,7 +156,7 @@ class Case:
 
         All in one branch, chosen as for a program that goes from HOME to each pose.
         """
-        from gcode2krl.program import tool_rotation
+        from gcode2krl.pose import tool_rotation
         from gcode2krl.robot.branch import Path as Poses
         from gcode2krl.robot.branch import best_branch
         from gcode2krl.robot.standing import limit_margin

@@ -64,7 +64,7 @@ def merged(
 
     Parameters
     ----------
-    targets : those of `plan_targets` of the whole toolpath.
+    targets : those of the whole toolpath.
     simplify_mm : how far corners that are left out may be from the new moves.
     tolerance_mm : blend tolerance that the targets were made with.
 

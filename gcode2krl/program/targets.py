@@ -22,13 +22,10 @@ from gcode2krl.compiled.threads import in_threads
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.program.blending import corner_cdis
 from gcode2krl.program.checks import axes_nowhere, check_toolpath
-from gcode2krl.program.long_moves import straight
-from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.tables import Event, Targets, Toolpath
 from gcode2krl.units import MM_PER_M
 
 HomePose = Callable[[int], tuple[Floats, Floats]]
-SpinOf = Callable[[Floats, Floats, Ints32, Bools], Floats | float]
 GRID_MM = 1e-3
 """Decimals of the KRL text: rows that print as the same point are one target."""
 
@@ -38,26 +35,15 @@ LEAST_UPRIGHT = 0.17364817766693033
 """Cosine of 80 degrees: a tool that is tilted further has no way to the clearance plane along its axis."""
 
 
-def plan_targets(
-    toolpath: Toolpath, cell: Cell, home_pose: HomePose, spin_of: SpinOf, tolerance_mm: float | None = None
-) -> Targets:
-    """Return the motions of the KRL program.
+class Away(NamedTuple):
+    """The poses of a route (r) away from HOME, but for the turn about the tool axis."""
 
-    Parameters
-    ----------
-    home_pose : tool number → tip position (3,) in mm and quaternion (4,) of HOME in ``$BASE``.
-    spin_of : positions (p, 3), axes (p, 3), tools (p,), and to which of them straight lines lead (p,) → spin
-        about the axis in rad, a number or (p,).
-    tolerance_mm : blend tolerance; below ``G64 P``, above the cell's own.
-
-    Raises
-    ------
-    NotUnderstoodError
-        Where the program has no motion.
-    """
-    plan = _Plan(toolpath, cell, home_pose)
-    plan.walk()
-    return plan.targets(spin_of, tolerance_mm)
+    position_mm: Floats
+    axis: Floats
+    """(r, 3) tool axis in ``$BASE``."""
+    tool: Ints32
+    lines: Bools
+    """(r,) True where a straight line leads to a pose from the one before, with the same tool."""
 
 
 @dataclass
@@ -84,8 +70,15 @@ class _Columns:
 _LIN, _PTP, _HOME = 0, 1, 2
 
 
-class _Plan:
+class Route:
+    """The motions of a KRL program, with the turn about the tool axis still open."""
+
     def __init__(self, toolpath: Toolpath, cell: Cell, home_pose: HomePose) -> None:
+        """Go through the rows of a Toolpath.
+
+        ``home_pose`` tells of a tool's number where HOME is in ``$BASE``: tip (3,) in mm, quaternion (4,).
+        Raises `NotUnderstoodError` where the program has no motion.
+        """
         self.toolpath, self.cell, self.home_pose = toolpath, cell, home_pose
         self.clearance = cell.clearance_z_mm if cell.clearance_z_mm is not None else _highest(toolpath)
         self.columns = _Columns()
@@ -94,6 +87,8 @@ class _Plan:
         self.axis = toolpath.axis[0]
         self.tool = self._frame_tool(0)
         self.tool_events: dict[int, int] = {}  # index of toolpath.events → target
+        self._walk()
+        self._join()
 
     def _frame_tool(self, number: int) -> int:
         """Return the tool whose frame moves: an unknown or unnamed tool moves as the mounted one."""
@@ -104,7 +99,7 @@ class _Plan:
 
     # --- the walk -------------------------------------------------------------------------------------
 
-    def walk(self) -> None:
+    def _walk(self) -> None:
         """Go through the rows once: runs of plain moves at a time, everything else one by one."""
         toolpath = self.toolpath
         plain = toolpath.is_position() & ~toolpath.machine
@@ -213,9 +208,9 @@ class _Plan:
 
     # --- the table ------------------------------------------------------------------------------------
 
-    def targets(self, spin_of: SpinOf, tolerance_mm: float | None) -> Targets:
-        """Assemble the table from what was planned."""
-        toolpath, columns = self.toolpath, self.columns
+    def _join(self) -> None:
+        """Join the columns, without rows that print as the point before them."""
+        columns = self.columns
         position, move = _joined(columns.position), np.concatenate(columns.move)
         kind, tool = np.concatenate(columns.kind), np.concatenate(columns.tool)
         axis = self._axes()
@@ -223,8 +218,19 @@ class _Plan:
         if not keep.all():
             position, move, kind, tool = position[keep], move[keep], kind[keep], tool[keep]
             axis = _rows(axis, keep)
-        kept = _Kept(keep)
-        rotation = self._rotations(position, axis, tool, kind, spin_of)
+        self._position, self._move, self._kind, self._of_tool = position, move, kind, tool
+        self._stand, self._kept = stand, _Kept(keep)
+        self._planned = planned = _as_slice(kind != _HOME)
+        lines = straight(kind != _LIN, kind == _HOME, tool)
+        self.away = Away(position[planned], _rows(axis, planned), tool[planned], lines[planned])
+
+    def targets(self, rotation: Floats, tolerance_mm: float | None) -> Targets:
+        """Return the table, with the quaternions (r, 4) of the poses that are `away` from HOME.
+
+        ``tolerance_mm`` is the blend tolerance; below ``G64 P``, above the cell's own.
+        """
+        toolpath, position, move = self.toolpath, self._position, self._move
+        kind, tool, stand, kept = self._kind, self._of_tool, self._stand, self._kept
         wait = np.zeros(len(position))
         events = self._place_events(stand, kept)
         for row in np.flatnonzero(toolpath.dwell_s > 0).tolist():
@@ -234,7 +240,7 @@ class _Plan:
         exact = self._exact_stops(programmed, move, kind, tool, wait, events)
         return Targets(
             position_mm=position,
-            rotation=rotation,
+            rotation=self._rotations(rotation),
             ptp=kind != _LIN,
             home=kind == _HOME,
             speed_mm_s=programmed.speed_mm_s,
@@ -289,25 +295,19 @@ class _Plan:
             return np.broadcast_to(self.toolpath.axis[0], (self.columns.count, 3))
         return np.concatenate(self.columns.axis)
 
-    def _rotations(
-        self, position: Floats, axis: Floats, tool: Ints32, kind: NDArray[np.int8], spin_of: SpinOf
-    ) -> Floats:
-        planned = _as_slice(kind != _HOME)
-        axis = _rows(axis, planned)
-        lines = straight(kind != _LIN, kind == _HOME, tool)
-        spin = spin_of(position[planned], axis, tool[planned], lines[planned])
-        rotation = np.empty((len(position), 4))
-        turned = tool_rotation(axis, spin)
+    def _rotations(self, away: Floats) -> Floats:
+        """Return the quaternions (p, 4) of all targets: those away from HOME (r, 4), and HOME's."""
+        rotation, planned = np.empty((len(self._position), 4)), self._planned
         if isinstance(planned, slice):
 
             def part(start: int, end: int) -> None:
-                rotation[planned][start:end] = turned[start:end]
+                rotation[planned][start:end] = away[start:end]
 
-            in_chunks(part, chunk_borders(len(turned)))
+            in_chunks(part, chunk_borders(len(away)))
         else:
-            rotation[planned] = turned
-        for row in np.flatnonzero(kind == _HOME):
-            position[row], rotation[row] = self.home_pose(int(tool[row]))
+            rotation[planned] = away
+        for row in np.flatnonzero(self._kind == _HOME):
+            rotation[row] = self.home_pose(int(self._of_tool[row]))[1]
         return rotation
 
     def _place_events(self, stand: "_StandingAt", kept: "_Kept") -> tuple[Event, ...]:
@@ -454,6 +454,13 @@ def _distinct(position: Floats, axis: Floats, kind: NDArray[np.int8], tool: Ints
 
     in_chunks(part, chunk_borders(len(kind) - 1))
     return different
+
+
+def straight(ptp: Bools, home: Bools, tool: Ints32) -> Bools:
+    """Mark the targets (p,) to which a straight line leads from the one before, with the same tool."""
+    lines = np.zeros(len(ptp), dtype=np.bool_)
+    lines[1:] = ~ptp[1:] & ~home[:-1] & (tool[1:] == tool[:-1])
+    return lines
 
 
 def _as_slice(chosen: Bools) -> slice | Ints:

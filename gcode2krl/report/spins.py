@@ -5,7 +5,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.report.drawing import BLACK, GREY, PALE, VERMILION, look
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 
@@ -13,11 +13,11 @@ _JUMP_RAD = np.pi
 
 
 def spin_map_figure(
-    path_mm: Floats, spin_rad: Floats, comfort: Floats, free: Floats, chosen_rad: Floats
+    path_mm: Floats, spin_rad: Floats, chosen_rad: Floats, reachable: Bools, collides: Bools, margin: Floats
 ) -> Figure:
-    """Draw the columns of a `clearance.SpinMap`: path (n,), spins (s,), two maps (s, n), the spin (n,)."""
+    """Draw a `pose.SpinMap`: path (n,), spins (s,), the spin (n,), and the columns (s, n) of its quality."""
     way_m, spin_deg = path_mm / MM_PER_M, spin_rad * DEG_PER_RAD
-    hits, possible = free <= 0.0, comfort > 0.0
+    is_free = reachable & ~collides
     with look():
         figure = Figure(figsize=(10.0, 5.5), layout="constrained")
         axes = figure.subplots()
@@ -25,7 +25,7 @@ def spin_map_figure(
         shown = axes.pcolormesh(
             way_m,
             spin_deg,
-            np.ma.masked_where(~possible | hits, np.minimum(comfort, free)),
+            np.ma.masked_where(~is_free, margin),
             cmap="viridis",
             vmin=0.0,
             vmax=1.0,
@@ -34,7 +34,7 @@ def spin_map_figure(
         axes.pcolormesh(
             way_m,
             spin_deg,
-            np.ma.masked_where(~(possible & hits), np.ones_like(free)),
+            np.ma.masked_where(~collides, np.ones_like(margin)),
             cmap=ListedColormap([VERMILION]),
             shading="nearest",
         )
@@ -50,13 +50,13 @@ def spin_map_figure(
         axes.set_xlabel("Path (m)")
         axes.set_ylabel("Spin about the tool axis (°)")
         axes.grid(visible=False)
-        worst = float(np.min(_along(np.minimum(comfort, free), spin_rad, chosen_rad)))
+        worst = float(np.min(_along(np.where(is_free, margin, -1.0), spin_rad, chosen_rad)))
         axes.set_title(f"least on the chosen spin: {worst:.2f}", loc="right", fontsize=8, color=GREY)
         keys = [
             Patch(color=BLACK, label="chosen"),
             Patch(color=PALE, label="beyond a limit, or out of reach"),
         ]
-        if (possible & hits).any():
+        if collides.any():
             keys.append(Patch(color=VERMILION, label="arm, spindle or tool hits something"))
         figure.legend(handles=keys, loc="outside lower center", ncols=3)
         figure.suptitle("Spin about the tool axis")

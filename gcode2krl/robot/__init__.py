@@ -18,8 +18,7 @@ from gcode2krl.robot.joints import (
     trial_rows,
 )
 from gcode2krl.robot.poses import flange_frames, forward, inverse, jacobian
-from gcode2krl.robot.quality import pose_quality
-from gcode2krl.robot.standing import limit_margin, raise_shares
+from gcode2krl.robot.standing import limit_margin, pose_margins, raise_shares
 
 __all__ = [
     "Follower",
@@ -39,7 +38,7 @@ __all__ = [
     "line_angles",
     "motion_angles",
     "places_between",
-    "pose_quality",
+    "pose_margins",
     "ptp_joints",
     "raise_shares",
     "rise_angles",

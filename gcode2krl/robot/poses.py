@@ -22,14 +22,15 @@ def forward(q_rad: ArrayLike, cell: Cell, tool: int = 1) -> tuple[Floats, Floats
     return pose[:, :3, 3], fr.quaternion_from_rotation(pose[:, :3, :3])
 
 
-def inverse(position_mm: ArrayLike, rotation: ArrayLike, cell: Cell, tool: int = 1) -> Floats:
+def inverse(position_mm: ArrayLike, rotation: ArrayLike, cell: Cell, tool: int | Ints32 = 1) -> Floats:
     """Return the joints (n, 8, 6) in rad of all branches for tool poses in ``$BASE``; NaN where out of reach.
 
-    ``position_mm`` (n, 3), ``rotation`` (n, 4) quaternions x, y, z, w. The branch's index is KUKA's status S.
+    ``position_mm`` (n, 3), ``rotation`` (n, 4) quaternions x, y, z, w; one tool or (n,) of them. The branch's
+    index is KUKA's status S.
     """
     position = np.atleast_2d(np.asarray(position_mm, dtype=float))
     quaternion = np.atleast_2d(np.asarray(rotation, dtype=float))
-    tools = np.full(len(position), tool, dtype=np.int32)
+    tools = np.broadcast_to(np.asarray(tool, dtype=np.int32), (len(position),))
     flange_position, flange_rotation = flange_frames(position, quaternion, tools, cell)
     rotations = np.broadcast_to(flange_rotation, (len(position), 3, 3))
     return all_branches(flange_position, rotations, cell.robot.geometry.array())

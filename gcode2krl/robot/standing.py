@@ -1,4 +1,6 @@
-"""The poses of the arm, row by row: distance to the limits, and what is not allowed."""
+"""The poses of the arm, row by row: distance to limits and singularities, and what is not allowed."""
+
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +9,7 @@ from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.core import FLOATS, INTS32, OUT_FLOATS, ArrayOf, core_function
 from gcode2krl.compiled.inputs import shaped
-from gcode2krl.units import RAD_PER_DEG
+from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 Bits = NDArray[np.uint16]
 
@@ -35,6 +37,27 @@ def limit_margin(q_rad: Floats, cell: Cell) -> Floats:
     """Return the distance (n,) in rad to the nearest joint limit, negative beyond it; NaN where q is."""
     margin, _ = _judged(q_rad, np.empty(0), cell)
     return margin
+
+
+def pose_margins(q_rad: Floats, cell: Cell) -> tuple[Floats, Floats]:
+    """Return how far joints (n, 6) are from limits in rad, negative beyond, and from singularities, a sine.
+
+    (n,) each, NaN where the joints are. Each joint counts with its best whole turn; of singularities the
+    wrist's, by A5, and the elbow's, by A3's distance from the stretched arm.
+    """
+    geometry = cell.robot.geometry.array()
+    limit_rad = functools.reduce(
+        np.minimum, (_in_best_turn(q_rad[:, k], *pair) for k, pair in enumerate(limits_rad(cell)))
+    )
+    stretched_rad = np.arctan2(geometry[1], geometry[4])
+    wrist, elbow = np.abs(np.sin(q_rad[:, 4])), np.abs(np.sin(q_rad[:, 2] + stretched_rad))
+    return limit_rad, np.minimum(wrist, elbow)
+
+
+def _in_best_turn(q_rad: Floats, low: float, high: float) -> Floats:
+    """Return the distance (n,) of angles to the nearer limit, in the best of their whole turns."""
+    turns = (q_rad + turn for turn in (0.0, -RAD_PER_REV, RAD_PER_REV))
+    return functools.reduce(np.maximum, (np.minimum(q - low, high - q) for q in turns))
 
 
 def what_is_wrong(q_rad: Floats, duration_s: Floats, cell: Cell) -> Bits:

@@ -8,7 +8,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.program import between, smooth_spin, straight, tool_rotation
+from gcode2krl.pose.path import between
+from gcode2krl.pose.quality import Judge, Quality
+from gcode2krl.pose.spin import smooth_spin, stiffest_spin, tool_rotation
+from gcode2krl.program.targets import straight
+from tests.pose.judging import judge_by
 
 angles = st.floats(-2 * np.pi, 2 * np.pi)
 components = st.floats(-1, 1)
@@ -57,22 +61,15 @@ def test_a_spin_for_each_row(rows):
     assert tool_rotation(axis, spin) == pytest.approx(np.array(one_by_one), abs=1e-9)
 
 
-def test_three_axes_have_no_rotation():
-    axis = np.broadcast_to(UP, (4, 3))
-    assert tool_rotation(axis, 0.0) == pytest.approx(np.tile([0, 0, 0, 1.0], (4, 1)), abs=0)
-
-
-@pytest.mark.parametrize("spin_deg", [-180, -30, 0, 90, 360])
-def test_three_axes_turn_about_z(spin_deg):
-    found = Rotation.from_quat(tool_rotation(UP[None], np.radians(spin_deg)))
-    assert (found * Rotation.from_euler("z", -spin_deg, degrees=True)).magnitude() == pytest.approx(
-        0, abs=1e-9
-    )
-
-
-def test_upside_down():
-    found = Rotation.from_quat(tool_rotation(-UP[None], 0.0))
-    assert found.as_matrix()[0] == pytest.approx(np.diag([1, -1, -1]), abs=1e-12)
+@pytest.mark.parametrize(
+    ("axis", "spin_deg", "abc_deg"),
+    [(UP, 0, (0, 0, 0)), (-UP, 0, (0, 0, 180)), *((UP, deg, (deg, 0, 0)) for deg in (-180, -30, 90, 360))],
+)
+def test_upright_and_upside_down(axis, spin_deg, abc_deg):
+    """All rows alike: the upright frame is turned about z alone, upside down it is that turned about x."""
+    turned = Rotation.from_quat(tool_rotation(np.broadcast_to(axis, (4, 3)), np.radians(spin_deg)))
+    off = turned * Rotation.from_euler("ZYX", abc_deg, degrees=True).inv()
+    assert off.magnitude() == pytest.approx(np.zeros(4), abs=1e-9)
 
 
 def test_no_rows():
@@ -84,8 +81,12 @@ def test_no_rows():
 PATH = np.column_stack([np.linspace(0, 2000, 201), np.zeros(201), np.zeros(201)])
 
 
+def spin_of(margin, position=PATH, is_target=None):
+    return smooth_spin(position, judge_by(margin), None, is_target)
+
+
 def around(centre_of, width_rad):
-    """Return a quality of two branches: 1 at a centre that may move with the row, 0 at its width."""
+    """Return a margin of two branches: 1 at a centre that may move with the row, 0 at its width."""
 
     def quality(rows, spin):
         off = np.abs(np.angle(np.exp(1j * (spin - centre_of(rows)))))
@@ -95,19 +96,15 @@ def around(centre_of, width_rad):
     return quality
 
 
-def test_zero_where_zero_is_good():
-    assert smooth_spin(PATH, around(lambda rows: np.zeros(len(rows)), np.pi)) == pytest.approx(0)
-
-
 @pytest.mark.parametrize("centre_deg", [-150, -40, 60, 175])
 def test_constant_where_a_constant_will_do(centre_deg):
-    spin = smooth_spin(PATH, around(lambda rows: np.full(len(rows), np.radians(centre_deg)), np.radians(30)))
+    spin = spin_of(around(lambda rows: np.full(len(rows), np.radians(centre_deg)), np.radians(30)))
     assert isinstance(spin, float)
     assert abs(np.degrees(spin) - centre_deg) <= 0.7 * 30
 
 
 def test_smallest_turn_wins_a_tie():
-    assert smooth_spin(PATH, lambda rows, spin: np.ones((len(rows), 2))) == pytest.approx(0)
+    assert spin_of(lambda rows, spin: np.ones((len(rows), 2))) == pytest.approx(0)
 
 
 def test_changes_slowly_where_no_constant_will_do():
@@ -117,7 +114,7 @@ def test_changes_slowly_where_no_constant_will_do():
         return np.radians(120) * PATH[rows, 0] / 2000
 
     quality = around(wanders, np.radians(25))
-    spin = smooth_spin(PATH, quality)
+    spin = spin_of(quality)
     assert np.shape(spin) == (201,)
     rows = np.arange(201)
     worst = min(quality(rows[k : k + 1], spin[k])[0, 0] for k in rows)
@@ -130,7 +127,7 @@ def test_between_targets_the_angle_is_on_the_way_from_one_to_the_other():
     centre_deg = np.array([0.0, 10.0, 70.0, 75.0, 80.0])  # at 0, 500, 1000, 1500, 2000 mm
     is_target = np.array([True, False, False, False, True])
     width = np.radians(42)
-    spin = smooth_spin(PATH[::50], around(lambda rows: np.radians(centre_deg)[rows], width), None, is_target)
+    spin = spin_of(around(lambda rows: np.radians(centre_deg)[rows], width), PATH[::50], is_target)
     assert np.shape(spin) == (5,)
     assert np.allclose(np.diff(spin), np.diff(spin)[0])
     apart = np.abs(np.degrees(spin) - centre_deg)
@@ -185,16 +182,48 @@ def test_no_line_leads_through_home_or_to_another_tool():
 def test_a_point_out_of_reach_does_not_make_the_others_worse():
     """No angle is possible in the last row: that which is good in all the others is taken."""
     good = around(lambda rows: np.full(len(rows), np.radians(100.0)), np.radians(30))
-    spin = smooth_spin(PATH, lambda rows, spin: np.where(rows[:, None] == 200, -1.0, good(rows, spin)))
+    spin = spin_of(lambda rows, spin: np.where(rows[:, None] == 200, -1.0, good(rows, spin)))
     assert np.abs(np.degrees(spin) - 100.0).max() <= 15.0
 
 
 def test_a_single_position():
-    assert smooth_spin(PATH[:1], around(lambda rows: np.full(len(rows), 1.0), 0.5)) == pytest.approx(
+    assert spin_of(around(lambda rows: np.full(len(rows), 1.0), 0.5), PATH[:1]) == pytest.approx(
         1.0, abs=0.36
     )
 
 
 def test_impossible_everywhere_is_still_a_number():
-    spin = smooth_spin(PATH, lambda rows, spin: np.full((len(rows), 8), -1.0))
-    assert np.isfinite(spin).all()
+    assert np.isfinite(spin_of(lambda rows, spin: np.full((len(rows), 8), -1.0)))
+
+
+def test_a_turn_that_hits_is_taken_before_one_out_of_reach():
+    """The arm reaches between 80 and 120 degrees only, and hits something throughout."""
+
+    def quality(rows, spin):
+        reachable = np.full((len(rows), 8), abs(np.degrees(spin) - 100.0) <= 20.0)
+        return Quality(reachable, reachable, np.where(reachable, 0.4, 0.0))
+
+    short = smooth_spin(PATH[:2], Judge(quality))
+    assert abs(np.degrees(short) - 100.0) <= 20.0
+
+
+@pytest.mark.parametrize(("softest_deg", "wanted_deg"), [(0.0, 90.0), (60.0, -50.0), (-60.0, 50.0)])
+def test_the_stiffest_turn_keeps_off_what_is_hardly_reached(softest_deg, wanted_deg):
+    """Bending falls with the distance from a turn; margins are above 0.15 within 90 or 50 degrees of zero."""
+    within_deg = 90.0 if softest_deg == 0.0 else 50.0
+
+    def margin(rows, spin):
+        return np.full((len(rows), 2), 0.2 if abs(np.degrees(spin)) < within_deg + 1.0 else 0.14)
+
+    def bending(rows, spin):
+        return np.full((len(rows), 2), 2.0 - abs(np.degrees(spin) - softest_deg) / 360.0)
+
+    spin = stiffest_spin(PATH, judge_by(margin, bending))
+    assert abs(np.degrees(spin)) == pytest.approx(abs(wanted_deg))
+    assert softest_deg == 0.0 or np.degrees(spin) == pytest.approx(wanted_deg)
+
+
+def test_where_no_turn_is_stiff_and_reached_the_smooth_one_is_taken():
+    margin = around(lambda rows: np.full(len(rows), 1.0), 0.5)
+    judge = judge_by(lambda rows, spin: 0.1 * margin(rows, spin), lambda rows, spin: np.ones((len(rows), 2)))
+    assert stiffest_spin(PATH, judge) == smooth_spin(PATH, judge)

@@ -1,19 +1,21 @@
-"""The turn about the tool axis keeps clear of what stands in the cell."""
+"""How good poses are, beside the distances of all capsules; the turn keeps clear of obstacles."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import predict, set_targets
-from gcode2krl.clearance import freedom, spin_map
 from gcode2krl.collision import HORIZON_MM, scene
 from gcode2krl.collision.bodies import capsules_of, parts_of
 from gcode2krl.collision.gaps import obstacle_gaps, placed, segment_distances
 from gcode2krl.collision.surroundings import pairs_of
+from gcode2krl.figures import figure_of
 from gcode2krl.gcode import read_gcode
-from gcode2krl.program import tool_rotation
-from gcode2krl.report.spins import spin_map_figure
-from gcode2krl.robot import inverse, pose_quality
+from gcode2krl.pose import spin_map, tool_rotation
+from gcode2krl.pose.quality import Poses, Quality, quality_of
+from gcode2krl.robot import inverse, pose_margins
 from gcode2krl.tables import rows_of
 from tests.test_clearance import PART, box, cell_with
 
@@ -78,25 +80,9 @@ def test_a_post_beside_a_long_move_turns_it(tmp_path):
 
 def test_what_stands_between_two_cuts_does_not_turn_it_where_home_is_between(tmp_path):
     """The tool never goes along the line from one cut to the other."""
-    lines = [
-        "G21 G90 G17",
-        "T1 M6",
-        "S8000 M3",
-        "G0 X0 Y-400 Z20",
-        "G43 H1 Z20",
-        "G1 Z-1 F500",
-        "G1 X10 F2000",
-    ]
-    lines += [
-        "G0 Z20",
-        "G28 Z0",
-        "G28 X0 Y0",
-        "G0 X0 Y400 Z20",
-        "G1 Z-1 F500",
-        "G1 X10 F2000",
-        "G0 Z20",
-        "M30",
-    ]
+    lines = ["G21 G90 G17", "T1 M6", "S8000 M3", "G0 X0 Y-400 Z20", "G43 H1 Z20", "G1 Z-1 F500"]
+    lines += ["G1 X10 F2000", "G0 Z20", "G28 Z0", "G28 X0 Y0", "G0 X0 Y400 Z20", "G1 Z-1 F500"]
+    lines += ["G1 X10 F2000", "G0 Z20", "M30"]
     file = tmp_path / "two.nc"
     file.write_text("\n".join(lines) + "\n")
     low = box("post", [-260.0, -60, 60], [-190, 60, 330])
@@ -119,35 +105,67 @@ def test_the_cutter_in_an_obstacle_does_not_spoil_the_choice(part):
 def test_the_map_is_what_single_poses_are(part):
     cell = searching(POST)
     prediction = predict(part, cell, forces=False)
-    found = spin_map(prediction.motion, prediction.joints, cell)
-    assert found.comfort.shape == found.free.shape == (72, len(found.path_mm))
-    chosen = np.rad2deg(found.chosen_rad)
+    seen = spin_map(prediction.motion, prediction.joints, cell)
+    margin = seen.quality.free_margin()
+    assert margin.shape == (72, len(seen.path_mm))
+    chosen = np.rad2deg(seen.chosen_rad)
     assert chosen == pytest.approx(spins_deg(prediction.targets)[0], abs=1e-6)
-    near = np.abs(found.spin_rad[:, None] - found.chosen_rad).argmin(axis=0)
-    on_it = np.minimum(found.comfort, found.free)[near, np.arange(len(near))]
-    assert (on_it >= 0.3).all()
-    at_zero = np.abs(found.spin_rad).argmin()
-    assert (found.free[at_zero] < 0.0).any()
+    near = np.abs(seen.spin_rad[:, None] - seen.chosen_rad).argmin(axis=0)
+    assert (margin[near, np.arange(len(near))] >= 0.3).all()
+    at_zero = np.abs(seen.spin_rad).argmin()
+    assert seen.quality.collides[at_zero].any()
 
 
-def test_freedom_is_the_least_distance_in_clearances():
+def test_quality_is_the_least_distance_from_limits_singularities_and_obstacles():
     """Poses beside a box, against the distances of all capsules one by one."""
     cell = searching(POST)
     draw = np.random.default_rng(2)
     position = draw.uniform([-50, -100, 0], [200, 150, 100], (60, 3))
     rotation = tool_rotation(np.tile([0.0, 0.0, 1.0], (60, 1)), draw.uniform(-2.5, 2.5, 60))
-    tool = np.ones(60, dtype=np.int32)
-    comfort = pose_quality(position, rotation, tool, cell)
-    free = freedom(position, rotation, tool, cell, comfort)
-    assert (free[comfort <= 0.0] == 1.0).all()
-    rows, branches = np.nonzero(comfort > 0.0)
-    q_rad = inverse(position, rotation, cell, 1)[rows, branches]
-    gap_mm = least_distance(cell, q_rad)
-    enough_mm = 3.0 * cell.collision.clearance_mm
-    wanted = np.where(gap_mm <= 0.0, -1.0, np.minimum(gap_mm / enough_mm, 1.0))
-    np.testing.assert_allclose(free[rows, branches], wanted, atol=1e-6)
-    assert {-1.0, 1.0} < set(wanted.tolist())
+    quality = quality_of(Poses(position, rotation, np.ones(60, dtype=np.int32)), cell)
+    q_rad = inverse(position, rotation, cell, 1)
+    limit_rad, sine = (each.reshape(60, 8) for each in pose_margins(q_rad.reshape(-1, 6), cell))
+    assert (quality.reachable == (limit_rad >= 0.0)).all()
+    rows = quality.reachable & (sine > 0.0)
+    gap_mm, enough_mm = least_distance(cell, q_rad[rows]), 3.0 * cell.collision.clearance_mm
+    assert (quality.collides[rows] == (gap_mm <= 0.0)).all()
+    plain = np.minimum(np.minimum(np.degrees(limit_rad[rows]) / 30.0, 1.0), 2.0 * sine[rows])
+    free = gap_mm > 0.0
+    np.testing.assert_allclose(
+        quality.margin[rows][free], np.minimum(plain, gap_mm / enough_mm)[free], atol=1e-6
+    )
+    np.testing.assert_allclose(quality.margin[rows][~free], 0.5 * plain[~free], atol=1e-9)
+    assert 5 < np.count_nonzero(free) < len(free) - 5
     assert enough_mm < HORIZON_MM
+
+
+@pytest.mark.parametrize("turns", [-1, 1])
+def test_a_joint_counts_in_its_best_whole_turn(turns):
+    """A6 of the demonstration's arm turns by 350 degrees each way: 340 of them are 20 in the other turn."""
+    cell = searching()
+    q_rad = np.radians([[0.0, -90.0, 90.0, 0.0, 45.0, 0.0]])
+    q_rad[0, 5] = np.radians(turns * 340.0)
+    plain = np.array(q_rad)
+    plain[0, 5] -= turns * 2.0 * np.pi
+    assert pose_margins(q_rad, cell)[0] == pytest.approx(pose_margins(plain, cell)[0])
+
+
+QUALITIES = [
+    (False, False, 0.0),
+    (True, True, 0.1),
+    (True, True, 0.4),
+    (True, False, 0.0),
+    (True, False, 0.9),
+]
+"""From the worst to the best."""
+
+
+@pytest.mark.parametrize("first", range(5))
+@pytest.mark.parametrize("second", range(5))
+def test_a_hit_is_better_than_out_of_reach_and_worse_than_any_free_pose(first, second):
+    both = Quality(*(np.array([[QUALITIES[first][k], QUALITIES[second][k]]]) for k in range(3)))
+    for extreme, place in ((both.worst(axis=1), min(first, second)), (both.best(axis=1), max(first, second))):
+        assert tuple(column[0] for column in extreme) == QUALITIES[place]
 
 
 def test_a_prediction_of_one_sample_has_a_map(part, tmp_path):
@@ -155,5 +173,4 @@ def test_a_prediction_of_one_sample_has_a_map(part, tmp_path):
     prediction = predict(part, cell, forces=False)
     one = rows_of(prediction.motion, 0, 1)
     assert len(spin_map(one, prediction.joints, cell).path_mm) == 1
-    figure = spin_map_figure(*spin_map(one, prediction.joints, cell))
-    figure.savefig(tmp_path / "spin.png")
+    figure_of(replace(prediction, motion=one), "spin").savefig(tmp_path / "spin.png")
