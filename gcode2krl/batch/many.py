@@ -5,11 +5,10 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal, overload
 
-from gcode2krl.batch.crew import Answer, Crew
-from gcode2krl.batch.free_memory import budget_mb, expected_mb, fitting_processes
+from gcode2krl.batch.crew import Answer, crew_of
+from gcode2krl.batch.free_memory import expected_mb
 from gcode2krl.batch.parts import find_parts
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.compiled.threads import usable_cores
 from gcode2krl.errors import Gcode2KrlError, Issue, NotUnderstoodError
 from gcode2krl.files.program_names import likely_text_bytes
 from gcode2krl.pipeline import predict
@@ -72,11 +71,9 @@ def predict_many(
 
 
 def _predictions(tasks: list[_Task], processes: int | None, keep: bool) -> Iterator[Any]:
-    budget = budget_mb()
     costs_mb = [expected_mb(_size_bytes(file), whole_tables=True) for file, _, _ in tasks]
-    count = fitting_processes(min(processes or usable_cores(), len(tasks)), budget)
-    with Crew(count, budget) as crew:
-        for answer in crew.answers(_predicted, tasks, costs_mb, ahead=_AHEAD * count):
+    with crew_of(processes, costs_mb) as crew:
+        for answer in crew.answers(_predicted, tasks, costs_mb, ahead=_AHEAD * crew.processes):
             value = _value(answer, tasks[answer.task][0])
             if isinstance(value, Gcode2KrlError) and not keep:
                 raise value
