@@ -8,8 +8,6 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-import pytest
-
 import gcode2krl
 from tests.conftest import ROOT
 
@@ -61,7 +59,9 @@ def test_a_3mf_is_read_with_its_extra(tmp_path):
         "sys.modules.update(dict.fromkeys(sys.argv[3:]))\n"
         "main(['predict', sys.argv[1], '--nominal', sys.argv[2], '-o', 'out'])\n"
     )
-    (tmp_path / "part.nc").write_text("G21 G90\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG1 Z-1 F500\nG1 X20\nG0 Z20\nM30\n")
+    (tmp_path / "part.nc").write_text(
+        "G21 G90\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG1 Z-1 F500\nG1 X20\nG0 Z20\nM30\n"
+    )
 
     def read(*hidden):
         command = [sys.executable, "-c", program, "part.nc", file.name, *hidden]
@@ -74,5 +74,7 @@ def test_a_3mf_is_read_with_its_extra(tmp_path):
         done = read(name)
         assert done.returncode == 2
         (line,) = done.stderr.splitlines()
-        assert line.startswith("stock.3mf: error: a 3MF file needs packages that are not installed: the extra 3mf")
+        assert line.startswith(
+            "stock.3mf: error: a 3MF file needs packages that are not installed: the extra 3mf"
+        )
         assert 'python -m pip install "gcode2krl[3mf]"' in line

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _TICK_S = 0.5
 """Windows lets Ctrl-C through between two waits only; and how soon a worker notes that the batch is gone."""
 _LONGEST_WORD = 200
+_LIBRARIES = ("OMP_NUM_THREADS", *MATRIX_VARIABLES)
+"""What says how many threads a library may have."""
 _EXIT_CODE = re.compile(r"\{(SIG\w+|\w+\((\d+)\))")
 """What loky says of a process that ended: ``SIGKILL(-9)`` or ``EXIT(1)``."""
 
@@ -218,7 +220,9 @@ class _Worker:
             if self._closed:
                 raise RuntimeError("the batch was stopped")
             if self._pool is None:
-                libraries = {name: os.environ.get(name, "1") for name in ("OMP_NUM_THREADS", *MATRIX_VARIABLES)}
+                libraries = {
+                    name: os.environ.get(name, "1") for name in ("OMP_NUM_THREADS", *MATRIX_VARIABLES)
+                }
                 places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(self._folder))
                 environment = {**libraries, THREADS_VARIABLE: "1", **places}
                 begin = (self._words, os.getpid())

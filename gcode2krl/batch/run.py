@@ -12,8 +12,8 @@ from typing import Any, Protocol
 from gcode2krl.batch.cache import Cache
 from gcode2krl.batch.crew import Answer, crew_of
 from gcode2krl.batch.free_memory import expected_mb
-from gcode2krl.batch.outcome import Record, failed, line_of, why_failed, write_outputs
 from gcode2krl.batch.planning import Planned
+from gcode2krl.batch.results import Record, failed, line_of, why_failed, write_outputs
 from gcode2krl.batch.work import Made, make
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError
 
