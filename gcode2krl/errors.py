@@ -260,3 +260,10 @@ def input_error(
 ) -> NotUnderstoodError:
     """Return a `NotUnderstoodError` with one finding."""
     return NotUnderstoodError(Issue("error", code, line, message, remedy), source)
+
+
+def extra_missing(extra: str, user: str, source: str = "") -> NotUnderstoodError:
+    """Return the error for something whose packages a plain installation leaves out."""
+    remedy = f'python -m pip install "gcode2krl[{extra}]"'
+    sentence = f"{user} needs packages that are not installed: the extra {extra}"
+    return input_error("extra-missing", sentence, remedy, source=source)

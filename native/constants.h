@@ -9,68 +9,7 @@
 #include "core.h"
 
 /* gcode2krl.ascii_codes */
-#define CH_TAB 9
-#define CH_NEWLINE 10
-#define CH_RETURN 13
-#define CH_SPACE 32
 #define CH_END_OF_TAPE 26
-#define CH_EXCLAMATION 33
-#define CH_QUOTE 34
-#define CH_HASH 35
-#define CH_DOLLAR 36
-#define CH_PERCENT 37
-#define CH_AMPERSAND 38
-#define CH_PAREN_OPEN 40
-#define CH_PAREN_CLOSE 41
-#define CH_ASTERISK 42
-#define CH_PLUS 43
-#define CH_COMMA 44
-#define CH_MINUS 45
-#define CH_POINT 46
-#define CH_SLASH 47
-#define CH_DIGIT_0 48
-#define CH_DIGIT_1 49
-#define CH_DIGIT_3 51
-#define CH_DIGIT_6 54
-#define CH_DIGIT_9 57
-#define CH_COLON 58
-#define CH_SEMICOLON 59
-#define CH_LESS 60
-#define CH_EQUALS 61
-#define CH_GREATER 62
-#define CH_QUESTION 63
-#define CH_AT_SIGN 64
-#define CH_CARET 94
-#define CH_LETTER_A 65
-#define CH_LETTER_C 67
-#define CH_LETTER_E 69
-#define CH_LETTER_F 70
-#define CH_LETTER_G 71
-#define CH_LETTER_I 73
-#define CH_LETTER_J 74
-#define CH_LETTER_K 75
-#define CH_LETTER_L 76
-#define CH_LETTER_M 77
-#define CH_LETTER_N 78
-#define CH_LETTER_O 79
-#define CH_LETTER_P 80
-#define CH_LETTER_R 82
-#define CH_LETTER_S 83
-#define CH_LETTER_T 84
-#define CH_LETTER_X 88
-#define CH_LETTER_Y 89
-#define CH_LETTER_Z 90
-#define CH_BRACKET_OPEN 91
-#define CH_BRACKET_CLOSE 93
-#define CH_UNDERSCORE 95
-#define CH_SMALL_A 97
-#define CH_SMALL_G 103
-#define CH_SMALL_M 109
-#define CH_SMALL_S 115
-#define CH_SMALL_Z 122
-#define CH_BRACE_OPEN 123
-#define CH_BRACE_CLOSE 125
-#define CH_TILDE 126
 #define CH_CASE_BIT 32
 #define CH_FIRST_FOREIGN 128
 
@@ -184,8 +123,6 @@
 
 /* gcode2krl.gcode.vocabulary */
 #define V_CASE_BIT 32
-#define V_DOLLAR 36
-#define V_EXCLAMATION 33
 #define V_LINE_LIMIT 4096
 #define V_MARK 33
 #define V_PROGRAM_LINE 36
@@ -333,20 +270,6 @@
 #define V_M_CODES 4
 
 /* gcode2krl.gcode.dialect_marks */
-#define D_AMPERSAND 38
-#define D_ASTERISK 42
-#define D_COLON 58
-#define D_COMMA 44
-#define D_EQUALS 61
-#define D_GREATER 62
-#define D_HASH 35
-#define D_LESS 60
-#define D_MINUS 45
-#define D_PLUS 43
-#define D_POINT 46
-#define D_QUESTION 63
-#define D_QUOTE 34
-#define D_SEMICOLON 59
 #define D_SKIP_LEVEL 1
 #define D_HEAD_LINES 2
 #define D_DOLLAR_LINES 4
@@ -790,6 +713,7 @@
 
 /* gcode2krl.robot.standing */
 #define STANDING_RAD_PER_DEG 0.017453292519943295
+#define STANDING_RAD_PER_REV 6.283185307179586
 #define STANDING_UNREACHED 64
 #define STANDING_FAST 128
 #define STANDING_WRIST 256

@@ -7,7 +7,19 @@ from typing import NamedTuple
 import click
 
 _PROGRAMS = (
-    *("gcode2krl", "python", "py", "pip", "pytest", "ruff", "mypy", "lint-imports", "mkdocs", "taplo"),
+    *(
+        "gcode2krl",
+        "python",
+        "py",
+        "pip",
+        "pytest",
+        "ruff",
+        "mypy",
+        "lint-imports",
+        "import-linter",
+        "mkdocs",
+        "taplo",
+    ),
     *("bash", "cat", "eval", "source", "git", "docker", "podman", "pre-commit", "dask"),
     *("cmd", "cmd.exe", "powershell", "powershell.exe"),
     *("act", "gitlab-runner", "jupyter", "nbconvert"),

@@ -8,8 +8,6 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-import pytest
-
 import gcode2krl
 from tests.conftest import ROOT
 
@@ -41,9 +39,8 @@ def test_a_dependency_is_imported_or_has_a_reason():
     assert unused == with_reason
 
 
-@pytest.mark.slow
-def test_a_3mf_is_read_with_lxml_and_networkx(tmp_path):
-    """What those two are there for; STL and PLY need neither."""
+def test_a_3mf_is_read_with_its_extra(tmp_path):
+    """What lxml and networkx are there for; without them one line says so, and STL and PLY need neither."""
     vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in POINTS)
     triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in TRIANGLES)
     model = (
@@ -58,19 +55,26 @@ def test_a_3mf_is_read_with_lxml_and_networkx(tmp_path):
         archive.writestr("3D/3dmodel.model", model)
         archive.writestr("[Content_Types].xml", "<Types/>")
     program = (
-        "import sys; from pathlib import Path; from gcode2krl.cutting.raw_part import load_mesh\n"
-        "hidden = sys.argv[2:]\n"
-        "class Hide:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name.split('.')[0] in hidden: raise ModuleNotFoundError(name)\n"
-        "sys.meta_path.insert(0, Hide())\n"
-        "print(len(load_mesh(Path(sys.argv[1])).faces))\n"
+        "import sys; from gcode2krl.cli.main import main\n"
+        "sys.modules.update(dict.fromkeys(sys.argv[3:]))\n"
+        "main(['predict', sys.argv[1], '--nominal', sys.argv[2], '-o', 'out'])\n"
+    )
+    (tmp_path / "part.nc").write_text(
+        "G21 G90\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG1 Z-1 F500\nG1 X20\nG0 Z20\nM30\n"
     )
 
     def read(*hidden):
-        command = [sys.executable, "-c", program, str(file), *hidden]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120)
+        command = [sys.executable, "-c", program, "part.nc", file.name, *hidden]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
 
-    assert read().stdout.strip() == "4"
+    done = read()
+    assert done.returncode in (0, 1), done.stderr
+    assert "extra-missing" not in done.stderr
     for name in ("lxml", "networkx"):
-        assert f"NotUnderstoodError: {file}: error: not a mesh: {name}" in read(name).stderr
+        done = read(name)
+        assert done.returncode == 2
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(
+            "stock.3mf: error: a 3MF file needs packages that are not installed: the extra 3mf"
+        )
+        assert 'python -m pip install "gcode2krl[3mf]"' in line

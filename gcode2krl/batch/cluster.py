@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gcode2krl.batch.crew import Answer
-from gcode2krl.batch.identity import program_digest
+from gcode2krl.batch.planning import program_digest
 from gcode2krl.batch.work import Made, Task, make
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.errors import NotUnderstoodError, input_error

@@ -5,12 +5,12 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal, overload
 
-from gcode2krl.batch.crew import Answer, Crew
-from gcode2krl.batch.free_memory import budget_mb, expected_mb, fitting_processes
+from gcode2krl.batch.crew import crew_of
+from gcode2krl.batch.free_memory import expected_mb
 from gcode2krl.batch.parts import find_parts
+from gcode2krl.batch.results import why_failed
 from gcode2krl.cell import Cell, load_cell
-from gcode2krl.compiled.threads import usable_cores
-from gcode2krl.errors import Gcode2KrlError, Issue, NotUnderstoodError
+from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError
 from gcode2krl.files.program_names import likely_text_bytes
 from gcode2krl.pipeline import predict
 from gcode2krl.prediction import Prediction
@@ -72,12 +72,11 @@ def predict_many(
 
 
 def _predictions(tasks: list[_Task], processes: int | None, keep: bool) -> Iterator[Any]:
-    budget = budget_mb()
     costs_mb = [expected_mb(_size_bytes(file), whole_tables=True) for file, _, _ in tasks]
-    count = fitting_processes(min(processes or usable_cores(), len(tasks)), budget)
-    with Crew(count, budget) as crew:
-        for answer in crew.answers(_predicted, tasks, costs_mb, ahead=_AHEAD * count):
-            value = _value(answer, tasks[answer.task][0])
+    with crew_of(processes, costs_mb) as crew:
+        for answer in crew.answers(_predicted, tasks, costs_mb, ahead=_AHEAD * crew.processes):
+            source = str(tasks[answer.task][0])
+            value = NotUnderstoodError(why_failed(answer.failure), source) if answer.failure else answer.value
             if isinstance(value, Gcode2KrlError) and not keep:
                 raise value
             yield value
@@ -90,16 +89,6 @@ def _predicted(task: _Task) -> Prediction | Gcode2KrlError:
         return predict(file, cell, **options)
     except Gcode2KrlError as error:
         return error
-
-
-def _value(answer: Answer, file: Path) -> Any:
-    return died(answer.failure, str(file)) if answer.failure else answer.value
-
-
-def died(failure: str, source: str) -> NotUnderstoodError:
-    """Return the error for a part at which two workers died."""
-    remedy = "give it more memory, or fewer --processes; if neither helps, report it with the part"
-    return NotUnderstoodError(Issue("error", "worker-died", 0, failure, remedy), source)
 
 
 def _size_bytes(file: Path) -> int:

@@ -1,18 +1,27 @@
-"""What is to be done for each part, before anything is computed: its order, its key, its place."""
+"""What is to be done for each part, before anything is computed: its order, its place, its key.
+
+A key names what a result depends on: the bytes of the part, the cell, the options, and the program itself.
+"""
 
 import hashlib
-from collections.abc import Iterable, Iterator
+import json
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.batch.identity import key_of
 from gcode2krl.batch.parts import Part
-from gcode2krl.batch.places import alike, program_name, refuse_collisions
 from gcode2krl.batch.work import Task
 from gcode2krl.cell import Cell
-from gcode2krl.errors import Issue
-from gcode2krl.files.program_names import likely_text_bytes
+from gcode2krl.cell.library import models_folder
+from gcode2krl.compiled.core import core_digest
+from gcode2krl.errors import Issue, input_error
+from gcode2krl.files.program_names import likely_text_bytes, program_stem
+from gcode2krl.krl import suggested_name
+from gcode2krl.krl.names import name_problem
 from gcode2krl.result import cell_of, sha256_of
 from gcode2krl.translation import Order
 from gcode2krl.translation.inputs import (
@@ -22,6 +31,7 @@ from gcode2krl.translation.inputs import (
     require_search,
     subprogram_files,
 )
+from gcode2krl.version import __version__
 
 _PLACES = ("report", "job_path", "search")
 """Options that say where something is; for a key counts what it is."""
@@ -106,3 +116,87 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
     if order.job_path is not None:
         job = Path(order.job_path)
         yield "job", (job.name, hashlib.sha256(job.read_bytes()).hexdigest())
+
+
+# where programs go ------------------------------------------------------------------------------------------
+
+
+def program_name(part: Part, taken: Sequence[str]) -> str:
+    """Return the name of a part's program: the file's, or one made from it that a controller takes."""
+    stem = program_stem(part.key)
+    return suggested_name(stem, taken) if name_problem(stem, taken) else stem
+
+
+def refuse_collisions(parts: Iterable[Part], name_of: Callable[[Part], str]) -> None:
+    """Raise `NotUnderstoodError` where two parts of one folder have one program name; names both."""
+    seen: dict[str, Part] = {}
+    for part in parts:
+        place = f"{part.folder}{name_of(part)}"
+        other = seen.setdefault(place.casefold(), part)  # neither KRL nor Windows tells case apart
+        if other is not part:
+            sentence = f"{other.file} and {part.file} would both be written as {place}.src"
+            raise input_error("output-is-input", sentence, "rename one of them")
+
+
+def alike(parts: Iterable[Part], name_of: Callable[[Part], str]) -> Mapping[str, Issue]:
+    """Return part → finding for parts of different folders whose programs have one name."""
+    of_name: dict[str, list[Part]] = {}
+    for part in parts:
+        of_name.setdefault(name_of(part).casefold(), []).append(part)
+    findings = {}
+    for same in of_name.values():
+        for part in same if len(same) > 1 else ():
+            others = [other.key for other in same if other is not part]
+            more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+            sentence = f"{others[0]}{more} has the program name {name_of(part)} too"
+            remedy = "a controller keeps one program of a name: rename one if both go to the same robot"
+            findings[part.key] = Issue("note", "krl-name", 0, sentence, remedy)
+    return findings
+
+
+# what a result depends on -----------------------------------------------------------------------------------
+
+
+_FORMAT = 1
+"""Of an entry of the cache; a change of it lets all earlier entries go."""
+_RECKONING = ("numpy", "scipy", "trimesh", "manifold3d")
+"""Packages whose versions may decide over the last digit."""
+_MADE = frozenset(["__pycache__", "built"])
+"""Folders of what is made from the sources."""
+
+
+@cache
+def program_digest() -> str:
+    """Return what tells one state of this program from another: version, files, core, packages, processor.
+
+    The version alone would not do in a source tree, where the files change below it.
+    """
+    digest = hashlib.sha256(f"{__version__} {core_digest()} {platform.machine()}".encode())
+    for name in _RECKONING:
+        digest.update(f"{name} {_version_of(name)}\n".encode())
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package, models_folder()):
+        for file in sorted(folder.rglob("*")):
+            if file.is_file() and not _MADE.intersection(file.parts):
+                digest.update(file.relative_to(folder).as_posix().encode() + b"\0")
+                digest.update(hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def key_of(input_sha256: str, cell_sha256: str, settings: Mapping[str, Any]) -> str:
+    """Return the name of an entry; ``settings`` are the options and names that its files depend on."""
+    stated = {
+        "format": _FORMAT,
+        "program": program_digest(),
+        "input": input_sha256,
+        "cell": cell_sha256,
+        "settings": dict(settings),
+    }
+    return hashlib.sha256(json.dumps(stated, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _version_of(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""

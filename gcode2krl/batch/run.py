@@ -5,16 +5,16 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from gcode2krl.batch.cache import Cache
-from gcode2krl.batch.crew import Answer, Crew
-from gcode2krl.batch.free_memory import budget_mb, expected_mb, fitting_processes
-from gcode2krl.batch.outcome import Record, failed, line_of, why_failed, write_outputs
+from gcode2krl.batch.crew import Answer, crew_of
+from gcode2krl.batch.free_memory import expected_mb
 from gcode2krl.batch.planning import Planned
+from gcode2krl.batch.results import Record, failed, line_of, why_failed, write_outputs
 from gcode2krl.batch.work import Made, make
-from gcode2krl.compiled.threads import usable_cores
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError
 
 _OF_THE_MACHINE = frozenset(["core-missing", "file-unreadable", "output-unwritable"])
@@ -72,12 +72,7 @@ def run_batch(
 
 def crew_for(processes: int | None) -> Callable[[Sequence[float]], AbstractContextManager[Workers]]:
     """Return the maker of a crew: so many processes or one a core, and no more than fit into the memory."""
-
-    def crew(costs_mb: Sequence[float]) -> Crew:
-        budget = budget_mb()
-        return Crew(fitting_processes(min(processes or usable_cores(), len(costs_mb)), budget), budget)
-
-    return crew
+    return partial(crew_of, processes)
 
 
 def cluster_at(address: str) -> Callable[[Sequence[float]], AbstractContextManager[Workers]]:

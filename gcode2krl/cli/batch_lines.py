@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.standard_files import tell
 from gcode2krl.errors import Issue, told

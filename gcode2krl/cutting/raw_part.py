@@ -5,6 +5,7 @@ import logging
 import math
 import warnings
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +19,14 @@ from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
 from gcode2krl.cutting.solids import mesh_of, solid_of
-from gcode2krl.errors import input_error
+from gcode2krl.errors import extra_missing, input_error
 from gcode2krl.tables import Toolpath
 
 if TYPE_CHECKING:
     import trimesh
 
+_NEEDED_FOR_3MF = ("lxml", "networkx")
+"""What trimesh reads its XML with, and puts its objects in their places."""
 _METRES_MM = 1.0
 """A mesh smaller than this in every direction is taken to be in metres."""
 _LARGEST_MM = 20_000.0
@@ -84,14 +87,17 @@ def load_mesh(file: Path, what: str = "stock") -> "trimesh.Trimesh":
     """Return the mesh of a raw part, or of ``what`` else, in mm.
 
     Cracks are closed (`solids.solid_of`). Raises `NotUnderstoodError` where the file is missing, not a mesh,
-    has holes or is not in mm.
+    has holes or is not in mm, or where it is a 3MF file and the extra for them is not installed.
     """
     if not file.is_file():
         raise input_error(
             "file-unreadable", f"cannot read the {what}: no such file", REMEDY, source=str(file)
         )
     try:
-        mesh = _solid_of(*read_mesh_file(file))
+        data, kind = read_mesh_file(file)
+        if kind == "3mf" and not all(map(find_spec, _NEEDED_FOR_3MF)):
+            raise extra_missing("3mf", "a 3MF file", str(file))
+        mesh = _solid_of(data, kind)
     except OSError as error:
         words = f"cannot read the {what}: {error.strerror}"
         raise input_error("file-unreadable", words, REMEDY, source=str(file)) from None

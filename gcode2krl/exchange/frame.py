@@ -79,9 +79,9 @@ class Frame:
 
         pyarrow, polars, pandas 3, DuckDB and others call this: ``pyarrow.table(prediction.motion)``.
         """
-        from gcode2krl.exchange.arrow_stream import stream_with_units
+        from gcode2krl.exchange.arrow import arrow_table
 
-        return stream_with_units(self.to_polars(), self.units())
+        return arrow_table(self.columns()).__arrow_c_stream__(requested_schema)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.facts()})"

@@ -4,44 +4,27 @@ Plain module constants: the compiled core takes their values from here. What a d
 `dialects`.
 """
 
-from gcode2krl.ascii_codes import (
-    AMPERSAND,
-    ASTERISK,
-    COLON,
-    COMMA,
-    EQUALS,
-    GREATER,
-    HASH,
-    LESS,
-    MINUS,
-    PLUS,
-    POINT,
-    QUESTION,
-    QUOTE,
-    SEMICOLON,
-)
-
 SKIP_LEVEL, HEAD_LINES, DOLLAR_LINES, STATEMENTS, POINTS, MACROS = 1, 2, 4, 8, 16, 32
 """Bits of the syntax: ``/2``, ``:1234`` and ``%name``, ``$H``, ``MSG("…")``, numbers without
 a point, ``IF``."""
 PROGRAMS_NONE, PROGRAMS_LINUXCNC, PROGRAMS_FANUC, PROGRAMS_SINUMERIK = range(4)
 """How parameters, jumps and subprograms are written: not at all, O-words, custom macro B, R parameters."""
 
-NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = LESS, GREATER, POINT
+NEXT_ABSOLUTE, NEXT_INCREMENTAL, NEXT_POINTLESS = ord("<"), ord(">"), ord(".")
 """Marks before a word: ``X=AC(5)``, ``X=IC(5)``, a number without a decimal point."""
-NEXT_SHORTEST, NEXT_FORWARD, NEXT_BACKWARD = QUESTION, SEMICOLON, HASH
+NEXT_SHORTEST, NEXT_FORWARD, NEXT_BACKWARD = ord("?"), ord(";"), ord("#")
 """Marks before a rotary word: ``C=DC(5)`` the shorter way, ``C=ACP(5)`` and ``C=ACN(5)`` up and down."""
-NEXT_VECTOR = ASTERISK
+NEXT_VECTOR = ord("*")
 """Mark before A, B or C: a component of the tool vector, ``A3=0.1``."""
-TIP_ON, TIP_OFF = COMMA, MINUS
+TIP_ON, TIP_OFF = ord(","), ord("-")
 """``TRAORI`` and ``TRAFOOF``: X, Y, Z are the tip, and the machine's axes again."""
-OTHER_TIP = QUOTE
+OTHER_TIP = ord('"')
 """``TRAORI(2)``: another transformation than the first."""
-SKIPPED = AMPERSAND
+SKIPPED = ord("&")
 """A statement that says nothing to this robot."""
-SHIFT_SET, SHIFT_ADD = EQUALS, PLUS
+SHIFT_SET, SHIFT_ADD = ord("="), ord("+")
 """``TRANS`` and ``ATRANS``: the axis words of the block are a shift of the zero, or are added to it."""
-PROGRAM_NUMBER = COLON
+PROGRAM_NUMBER = ord(":")
 """``O1234`` alone in its line, where a program of that number begins."""
 
 HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP, TIP, FEED_AXES = range(12)

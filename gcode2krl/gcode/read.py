@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.ascii_codes import NEWLINE, PAREN_OPEN
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import dialect_marks as d
@@ -242,7 +241,7 @@ def _scanned(
 
 def _start_of_line(text: bytes, line: int) -> int:
     """Return the place in a text at which a line begins, the first being 0."""
-    return int(np.flatnonzero(np.frombuffer(text, np.uint8) == NEWLINE)[line - 1]) + 1 if line else 0
+    return int(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))[line - 1]) + 1 if line else 0
 
 
 def _size_of(stream: BinaryIO) -> int:
@@ -335,7 +334,7 @@ class _Interpreter:
     def _execute(self, words: Words, text: bytes) -> int | None:
         self.most_decimals = max(self.most_decimals, words.most_decimals)
         if len(words.message_span):
-            words.value[words.letter == PAREN_OPEN] += len(self.messages)
+            words.value[words.letter == ord("(")] += len(self.messages)
             self.messages += [_decode(text[a:b]) for a, b in words.message_span]
         self.counts["marks"] = 0
         at = 0

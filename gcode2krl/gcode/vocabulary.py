@@ -4,13 +4,13 @@ Plain module constants: the compiled core takes their values from here. In it a 
 value, so that G28.1 is a whole number, 281; an M number is its value.
 """
 
-from gcode2krl.ascii_codes import CASE_BIT, DOLLAR, EXCLAMATION
+from gcode2krl.ascii_codes import CASE_BIT
 
 LINE_LIMIT = 4096
 """Longest line that is read, in bytes; a part program has none that long."""
-MARK = EXCLAMATION
+MARK = ord("!")
 """Stands in the column of letters where something cannot be read."""
-PROGRAM_LINE = DOLLAR
+PROGRAM_LINE = ord("$")
 """Stands for a whole line with an expression, a parameter or an O-word."""
 UNREAD_NUMBER = CASE_BIT
 """Added to a letter whose value cannot be read: the small letter."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
-from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.files.stored import Stored, Texts, store, whole_lines
@@ -329,7 +328,7 @@ class _Reader:
         """Return where each line of a file begins, and the end; found once it is asked for."""
         if file not in self.line_starts:
             text = self.texts[self.names[file]]
-            newline = np.flatnonzero(text == NEWLINE)
+            newline = np.flatnonzero(text == ord("\n"))
             self.line_starts[file] = np.concatenate([[0], newline + 1, [len(text)]])
         return self.line_starts[file]
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints, Ints32
-from gcode2krl.ascii_codes import NEWLINE
 from gcode2krl.compiled.chunks import in_chunks
 from gcode2krl.compiled.core import BYTES, INT, OUT_BYTES, OUT_FLOATS, OUT_INTS, OUT_INTS32, core_function
 
@@ -105,7 +104,7 @@ def _borders(data: NDArray[np.uint8], chunk_bytes: int) -> list[int]:
 def _behind_line(data: NDArray[np.uint8], at: int) -> int:
     """Return where the line that a byte belongs to has ended."""
     for start in range(at, len(data), _SEARCHED_BYTES):
-        ends = np.flatnonzero(data[start : start + _SEARCHED_BYTES] == NEWLINE)
+        ends = np.flatnonzero(data[start : start + _SEARCHED_BYTES] == ord("\n"))
         if len(ends):
             return start + int(ends[0]) + 1
     return len(data)

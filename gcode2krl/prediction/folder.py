@@ -47,12 +47,12 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 def table_files(place: Path, tables: Mapping[str, Columns], csv: bool) -> dict[Path, Content]:
     """Return the files of tables by name and what writes them; with ``csv`` as CSV too."""
-    from gcode2krl.exchange.arrow_stream import write_parquet
+    from gcode2krl.exchange.arrow import write_parquet
 
     files: dict[Path, Content] = {}
     for name, columns in tables.items():
         frame = columns.to_polars()
-        files[place / f"{name}.parquet"] = partial(write_parquet, frame, columns.units())
+        files[place / f"{name}.parquet"] = partial(write_parquet, frame)
         if csv:
             files[place / f"{name}.csv"] = frame.write_csv
     return files

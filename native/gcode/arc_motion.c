@@ -31,7 +31,7 @@ Arc arc_of(const Block *b) {
 
 /* Tell whether the centre word along the arc's axis is 0 or missing; report it where it is not. */
 static bool axis_word_is_harmless(Block *b, const Arc *arc) {
-    const int index = V_WORD_I + arc->third, letter = CH_LETTER_I + arc->third;
+    const int index = V_WORD_I + arc->third, letter = 'I' + arc->third;
     if (!b->has[index])
         return true;
     const bool plane_named = b->has[V_WORD_X + arc->second] || b->has[V_WORD_I + arc->second] ||

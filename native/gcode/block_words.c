@@ -137,18 +137,18 @@ static bool sets_output(const Block *b) {
 
 /* Return the place of a word's letter in arrays by letter. */
 static int index_of_letter(int c) {
-    return c == CH_AT_SIGN ? V_WORD_RADIUS : c == CH_CARET ? V_WORD_ANGLE : c - CH_LETTER_A;
+    return c == '@' ? V_WORD_RADIUS : c == '^' ? V_WORD_ANGLE : c - 'A';
 }
 
-/* Tell whether a word's value cannot be read; CH_AT_SIGN is the letter below A. */
-static bool is_unread(uint8_t c) { return c >= CH_AT_SIGN + V_UNREAD_NUMBER; }
+/* Tell whether a word's value cannot be read; '@' is the letter below A. */
+static bool is_unread(uint8_t c) { return c >= '@' + V_UNREAD_NUMBER; }
 
 static Taken take(Block *b, uint8_t c, double value) {
     if (is_unread(c))
         return faulty(AT(b->machine->doubt_of_letter, index_of_letter(c - V_UNREAD_NUMBER)));
-    if (c == CH_LETTER_G)
+    if (c == 'G')
         return take_g(b, value);
-    if (c == CH_LETTER_M)
+    if (c == 'M')
         return take_m(b, value);
     const int index = index_of_letter(c);
     if (b->next_word == D_NEXT_VECTOR)
@@ -174,7 +174,7 @@ static void pass_marks(Block *b, const Words *words, int64_t from, int64_t to) {
 static void tape_mark(Block *b, const Words *words, int64_t k, int64_t to, bool alone) {
     State *s = b->state;
     if (!alone) {
-        report(b, F_BAD_CHARACTER, (Says){.a = CH_PERCENT});
+        report(b, F_BAD_CHARACTER, (Says){.a = '%'});
         pass_marks(b, words, k, to);
         return;
     }
@@ -195,7 +195,7 @@ static bool rotary_is_harmless(Block *b) {
     State *s = b->state;
     bool good = true;
     for (int k = 0; k < OTHER_AXES_COUNT; k++) {
-        const int index = OTHER_AXES[k], letter = index + CH_LETTER_A;
+        const int index = OTHER_AXES[k], letter = index + 'A';
         if (!b->has[index] || is_declared(b->machine, k))
             continue;
         if (b->word[index] == 0.0) {
@@ -235,19 +235,19 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
     begin_without_codes(b);
     for (int64_t k = from; k < to; k++) {
         const uint8_t c = AT(words->letter, k);
-        if (c == CH_SLASH) {
+        if (c == '/') {
             if (b->machine->block_delete) {
                 pass_marks(b, words, from, to);
                 return LEFT_OUT;
             }
             if (slashes++ > 0) { /* the second may be a slip for a digit or a letter */
-                report(b, F_BAD_CHARACTER, (Says){.a = CH_SLASH});
+                report(b, F_BAD_CHARACTER, (Says){.a = '/'});
                 good = false;
             }
-        } else if (c == CH_PERCENT) {
+        } else if (c == '%') {
             tape_mark(b, words, k, to, to - from == 1);
             return LEFT_OUT;
-        } else if (c == CH_PAREN_OPEN) {
+        } else if (c == '(') {
             event(b, S_EVENT_TEXT, AT(words->value, k), 0.0);
         } else if (c == V_PROGRAM_LINE) {
             if (!want_program(b, b->machine->programs != D_PROGRAMS_NONE)) {
@@ -259,7 +259,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
             good = false;
         } else if (c == D_PROGRAM_NUMBER) { /* behind blocks another program begins */
             b->counts->program_wanted |= b->state->blocks > 0;
-        } else if (c < CH_AT_SIGN) {
+        } else if (c < '@') {
             take_dialect_mark(b, c);
             used = used || b->shift || b->tip;
         } else {
@@ -270,7 +270,7 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         }
     }
     if (b->has[V_WORD_E] && good && !sets_output(b)) { /* else it belongs to what has been reported */
-        report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + CH_LETTER_A});
+        report(b, F_UNKNOWN_LETTER, (Says){.a = V_WORD_E + 'A'});
         good = false;
     }
     if (b->unit_again && !repeats_unit(b)) {

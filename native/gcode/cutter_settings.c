@@ -59,7 +59,7 @@ static double tool_diameter(Block *b, int32_t code) {
     if (b->has[V_WORD_D]) {
         tool = whole(b->word[V_WORD_D]);
         if (tool == NOT_WHOLE) {
-            report(b, F_BAD_INTEGER, (Says){.a = V_WORD_D + CH_LETTER_A});
+            report(b, F_BAD_INTEGER, (Says){.a = V_WORD_D + 'A'});
             return NAN;
         }
         if (tool == 0)

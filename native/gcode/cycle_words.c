@@ -106,13 +106,13 @@ static bool take_heights(Block *b, Cycle *c) {
     const int bottom = V_WORD_X + c->third;
     const double code = s->motion * V_TENFOLD;
     if (!b->has[V_WORD_R] && !goes_on)
-        return fails(b, 0, FC_NO_R, (Says){.a = code, .b = CH_LETTER_X + c->third});
+        return fails(b, 0, FC_NO_R, (Says){.a = code, .b = 'X' + c->third});
     if (!b->has[bottom] && !goes_on)
         return fails(b, S_DOUBT_PLANE, FC_NO_DEPTH, 
-                     (Says){.a = code, .b = CH_LETTER_X + c->third, .c = s->plane});
+                     (Says){.a = code, .b = 'X' + c->third, .c = s->plane});
     if (!(b->has[V_WORD_R] && b->has[bottom]) && s->cycle_absolute != s->absolute)
         return fails(b, S_DOUBT_DISTANCE, FC_DISTANCE_CHANGED,
-                     (Says){.a = s->cycle_line, .b = CH_LETTER_X + c->third, .c = s->distance_line});
+                     (Says){.a = s->cycle_line, .b = 'X' + c->third, .c = s->distance_line});
     const double r = b->has[V_WORD_R] ? b->word[V_WORD_R] : s->cycle_r;
     const double depth = b->has[bottom] ? b->word[bottom] : s->cycle_depth;
     c->r = s->absolute ? r : r + c->level;
@@ -125,7 +125,7 @@ static bool take_heights(Block *b, Cycle *c) {
     s->cycle_depth = depth;
     if (c->r < c->bottom)
         return fails(b, c->rests_on, FC_R_BELOW_DEPTH,
-                     (Says){.a = c->r, .b = CH_LETTER_X + c->third, .c = c->bottom});
+                     (Says){.a = c->r, .b = 'X' + c->third, .c = c->bottom});
     return true;
 }
 

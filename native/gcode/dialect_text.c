@@ -16,7 +16,7 @@ static int64_t behind_blanks(Bytes text, int64_t i) {
 
 static bool stands_at(Bytes text, int64_t i, uint8_t c) { return i < text.rows && AT(text, i) == c; }
 
-static bool is_of_name(uint8_t c) { return is_letter(c) || is_digit(c) || c == CH_UNDERSCORE; }
+static bool is_of_name(uint8_t c) { return is_letter(c) || is_digit(c) || c == '_'; }
 
 static int64_t after_name(Bytes text, int64_t i) {
     while (i < text.rows && is_of_name(AT(text, i)))
@@ -26,8 +26,8 @@ static int64_t after_name(Bytes text, int64_t i) {
 
 /* Return the place behind the text that opens at i, the line's end where it does not close. */
 static int64_t after_quotes(Bytes text, int64_t i) {
-    for (i++; i < text.rows && AT(text, i) != CH_NEWLINE; i++)
-        if (AT(text, i) == CH_QUOTE)
+    for (i++; i < text.rows && AT(text, i) != '\n'; i++)
+        if (AT(text, i) == '"')
             return i + 1;
     return i;
 }
@@ -35,10 +35,10 @@ static int64_t after_quotes(Bytes text, int64_t i) {
 /* Return the place behind the parentheses that open at i. */
 static int64_t after_arguments(Bytes text, int64_t i) {
     int64_t depth = 0;
-    while (i < text.rows && AT(text, i) != CH_NEWLINE) {
+    while (i < text.rows && AT(text, i) != '\n') {
         const uint8_t c = AT(text, i);
-        i = c == CH_QUOTE ? after_quotes(text, i) : i + 1;
-        depth += (c == CH_PAREN_OPEN) - (c == CH_PAREN_CLOSE);
+        i = c == '"' ? after_quotes(text, i) : i + 1;
+        depth += (c == '(') - (c == ')');
         if (depth == 0)
             return i;
     }
@@ -51,7 +51,7 @@ static bool ends_value(Bytes text, int64_t i) {
     if (i >= text.rows)
         return true;
     const uint8_t c = AT(text, i);
-    return c == CH_NEWLINE || c == CH_SEMICOLON || c == CH_PAREN_CLOSE || c == CH_PAREN_OPEN || is_letter(c);
+    return c == '\n' || c == ';' || c == ')' || c == '(' || is_letter(c);
 }
 
 /* Write a refusal for a reason and leave out the rest of the line; in a program that computes it is reported when the
@@ -72,11 +72,11 @@ static int64_t refuse(Scan *scan, Evaluation *e, int64_t i, int64_t line, int re
 /* Return the place behind :1234 or the name behind %, i where neither begins there. */
 static int64_t head_line(Scan *scan, int64_t i, int64_t line) {
     const Bytes text = scan->text;
-    if (AT(text, i) == CH_PERCENT) {
+    if (AT(text, i) == '%') {
         const int64_t behind = behind_blanks(text, i + 1);
-        if (behind >= text.rows || AT(text, behind) == CH_NEWLINE)
+        if (behind >= text.rows || AT(text, behind) == '\n')
             return i;
-        put(scan, CH_PERCENT, 0.0, line);
+        put(scan, '%', 0.0, line);
         return line_end(text, i);
     }
     int64_t end = i + 1;
@@ -93,17 +93,17 @@ static int64_t head_line(Scan *scan, int64_t i, int64_t line) {
 static int64_t dollar_line(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool first) {
     const Bytes text = scan->text;
     const uint8_t c = AT(text, i);
-    if (c == CH_QUESTION || c == CH_TILDE) {
+    if (c == '?' || c == '~') {
         put(scan, D_SKIPPED, 0.0, line);
         return i + 1;
     }
-    if (c != CH_DOLLAR || !first)
+    if (c != '$' || !first)
         return i;
     const int64_t end = line_end(text, i);
     for (int64_t k = i; k < end; k++)
-        if (AT(text, k) == CH_EQUALS)
+        if (AT(text, k) == '=')
             return refuse(scan, e, i, line,
-                          (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_J ? DR_REASON_JOG : DR_REASON_SETTING);
+                          (AT(text, i + 1) & ~CH_CASE_BIT) == 'J' ? DR_REASON_JOG : DR_REASON_SETTING);
     put(scan, D_SKIPPED, 0.0, line);
     return end;
 }
@@ -119,9 +119,9 @@ static int32_t statement_kind(const Scan *scan, int64_t i, int64_t end) {
         while (i + n < end && (AT(scan->text, i + n) & ~(is_letter(AT(scan->text, i + n)) ? CH_CASE_BIT : 0)) ==
                                   AT(names, at + n))
             n++;
-        if (i + n == end && AT(names, at + n) == CH_NEWLINE)
+        if (i + n == end && AT(names, at + n) == '\n')
             return AT(scan->statement_kinds, k);
-        while (AT(names, at) != CH_NEWLINE)
+        while (AT(names, at) != '\n')
             at++;
         at++;
     }
@@ -151,7 +151,7 @@ static int counting(Bytes text, int64_t i, int64_t end) {
         if (i + n == end && KINDS[k].name[n] == 0)
             return KINDS[k].mark;
     }
-    return end == i + 2 && (AT(text, i + 1) & ~CH_CASE_BIT) == CH_LETTER_C ? UNKNOWN_COUNTING : 0;
+    return end == i + 2 && (AT(text, i + 1) & ~CH_CASE_BIT) == 'C' ? UNKNOWN_COUNTING : 0;
 }
 
 /* Write a word whose value stands behind =, i being the place behind it; its value gets `more`. */
@@ -159,7 +159,7 @@ static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_
     const Bytes text = scan->text;
     i = behind_blanks(text, i);
     const int64_t name_end = after_name(text, i);
-    const int kind = stands_at(text, behind_blanks(text, name_end), CH_PAREN_OPEN) ? counting(text, i, name_end) : 0;
+    const int kind = stands_at(text, behind_blanks(text, name_end), '(') ? counting(text, i, name_end) : 0;
     const bool counted = kind > 0;
     if (counted)
         i = behind_blanks(text, name_end) + 1;
@@ -167,7 +167,7 @@ static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_
     int64_t end = plain.end;
     double value = plain.value;
     const bool is_plain = plain.digits > 0 && plain.finding == F_OK && ends_value(text, end);
-    if (kind == UNKNOWN_COUNTING || (is_of_turn(kind) && letter > CH_LETTER_C))
+    if (kind == UNKNOWN_COUNTING || (is_of_turn(kind) && letter > 'C'))
         return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (!is_plain) {
         if (e == NULL)
@@ -176,7 +176,7 @@ static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_
         value = siemens_value(e, &end);
     }
     end = behind_blanks(text, end);
-    if (counted && !stands_at(text, end, CH_PAREN_CLOSE))
+    if (counted && !stands_at(text, end, ')'))
         return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (counted)
         put(scan, kind, 0.0, line);
@@ -188,10 +188,10 @@ static int64_t assigned(Scan *scan, Evaluation *e, int letter, int64_t i, int64_
 static int64_t message(Scan *scan, int64_t i, int64_t line) {
     const Bytes text = scan->text;
     const int64_t open = behind_blanks(text, i);
-    if (!stands_at(text, open, CH_PAREN_OPEN))
+    if (!stands_at(text, open, '('))
         return i;
     const int64_t quote = behind_blanks(text, open + 1), end = after_arguments(text, open);
-    if (stands_at(text, quote, CH_QUOTE))
+    if (stands_at(text, quote, '"'))
         put_message(scan, i - 3, after_quotes(text, quote) - 1, line); /* MSG("text */
     return end;
 }
@@ -199,14 +199,14 @@ static int64_t message(Scan *scan, int64_t i, int64_t line) {
 /* Leave out what belongs to a statement that says nothing: its arguments or its value. */
 static int64_t after_harmless(Bytes text, int64_t i) {
     const int64_t behind = behind_blanks(text, i);
-    if (stands_at(text, behind, CH_BRACKET_OPEN)) {
-        while (i < text.rows && AT(text, i) != CH_NEWLINE && AT(text, i) != CH_BRACKET_CLOSE)
+    if (stands_at(text, behind, '[')) {
+        while (i < text.rows && AT(text, i) != '\n' && AT(text, i) != ']')
             i++;
-        return after_harmless(text, i + stands_at(text, i, CH_BRACKET_CLOSE));
+        return after_harmless(text, i + stands_at(text, i, ']'));
     }
-    if (stands_at(text, behind, CH_PAREN_OPEN))
+    if (stands_at(text, behind, '('))
         return after_arguments(text, behind);
-    if (!stands_at(text, behind, CH_EQUALS))
+    if (!stands_at(text, behind, '='))
         return i;
     const int64_t value = behind_blanks(text, behind + 1);
     const Number number_behind = number(text, value);
@@ -216,18 +216,18 @@ static int64_t after_harmless(Bytes text, int64_t i) {
 /* Tell whether nothing or (1) stands behind TRAORI, at i. */
 static bool is_first_one(Bytes text, int64_t i) {
     i = behind_blanks(text, i);
-    if (!stands_at(text, i, CH_PAREN_OPEN))
+    if (!stands_at(text, i, '('))
         return true;
     const int64_t first = behind_blanks(text, i + 1);
-    return stands_at(text, first, CH_PAREN_CLOSE) ||
-           (stands_at(text, first, CH_DIGIT_1) && stands_at(text, behind_blanks(text, first + 1), CH_PAREN_CLOSE));
+    return stands_at(text, first, ')') ||
+           (stands_at(text, first, '1') && stands_at(text, behind_blanks(text, first + 1), ')'));
 }
 
 /* Tell whether the axes in the parentheses at i are X, Y and Z, some of them or none. */
 static bool are_linear(Bytes text, int64_t i) {
     i = behind_blanks(text, i);
     for (const int64_t end = after_arguments(text, i); i < end; i++)
-        if (is_of_name(AT(text, i)) && (AT(text, i) & ~CH_CASE_BIT) < CH_LETTER_X)
+        if (is_of_name(AT(text, i)) && (AT(text, i) & ~CH_CASE_BIT) < 'X')
             return false;
     return true;
 }
@@ -237,25 +237,25 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
     const Bytes text = scan->text;
     const int32_t kind = statement_kind(scan, i, end);
     const int64_t behind = behind_blanks(text, end);
-    const bool is_assigned = stands_at(text, behind, CH_EQUALS);
+    const bool is_assigned = stands_at(text, behind, '=');
     switch (kind < 0 ? -1 : kind % D_KIND_STEP) {
     case D_HARMLESS: put(scan, D_SKIPPED, 0.0, line); return after_harmless(text, end);
     case D_WHOLE_LINE: put(scan, D_SKIPPED, 0.0, line); return line_end(text, i);
     case D_RADIUS:
         if (is_assigned)
-            return assigned(scan, e, CH_LETTER_R, behind + 1, line, 0.0);
+            return assigned(scan, e, 'R', behind + 1, line, 0.0);
         break;
     case D_TURNS: /* full circles beside the arc itself, which P counts too */
         if (is_assigned)
-            return assigned(scan, e, CH_LETTER_P, behind + 1, line, 1.0);
+            return assigned(scan, e, 'P', behind + 1, line, 1.0);
         break;
     case D_JUMP: return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
     case D_MESSAGE:
         if (e != NULL)
             return refuse(scan, e, i, line, DR_REASON_MESSAGE);
         return message(scan, end, line);
-    case D_CODE: put(scan, CH_LETTER_G, kind / D_KIND_STEP, line); return end;
-    case D_ENDS: put(scan, CH_LETTER_M, V_M30, line); return end;
+    case D_CODE: put(scan, 'G', kind / D_KIND_STEP, line); return end;
+    case D_ENDS: put(scan, 'M', V_M30, line); return end;
     case D_TIP:
         put(scan, kind / D_KIND_STEP == 0 ? D_TIP_OFF : is_first_one(text, end) ? D_TIP_ON : D_OTHER_TIP, 0.0, line);
         return after_harmless(text, end);
@@ -269,7 +269,7 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
         return end;
     case D_REFUSED: return refuse(scan, e, i, line, kind / D_KIND_STEP);
     }
-    if (stands_at(text, behind, CH_COLON)) { /* a label: jumps to it are refused */
+    if (stands_at(text, behind, ':')) { /* a label: jumps to it are refused */
         put(scan, D_SKIPPED, 0.0, line);
         return behind + 1;
     }
@@ -283,23 +283,23 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
     while (behind < text.rows && is_digit(AT(text, behind)))
         behind++;
     const int64_t equals = behind_blanks(text, behind);
-    if (!stands_at(text, equals, CH_EQUALS))
+    if (!stands_at(text, equals, '='))
         return i;
     const int letter = AT(text, i) & ~CH_CASE_BIT;
     const bool numbered = behind > i + 1;
-    const bool first_one = behind == i + 2 && AT(text, i + 1) == CH_DIGIT_1;
-    if (letter == CH_LETTER_T)
+    const bool first_one = behind == i + 2 && AT(text, i + 1) == '1';
+    if (letter == 'T')
         return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
-    if (numbered && letter <= CH_LETTER_C) {
-        if (behind != i + 2 || AT(text, i + 1) != CH_DIGIT_3)
+    if (numbered && letter <= 'C') {
+        if (behind != i + 2 || AT(text, i + 1) != '3')
             return refuse(scan, e, i, line, DR_REASON_VECTORS);
         put(scan, D_NEXT_VECTOR, 0.0, line);
         return assigned(scan, e, letter, equals + 1, line, 0.0);
     }
-    if (letter == CH_LETTER_R && numbered)
+    if (letter == 'R' && numbered)
         return e == NULL ? NEEDS_LINE : assign_r(e, i, behind, equals + 1);
-    if (letter == CH_LETTER_R || letter == CH_LETTER_N || letter == CH_LETTER_O ||
-        (numbered && !(first_one && (letter == CH_LETTER_S || letter == CH_LETTER_M))))
+    if (letter == 'R' || letter == 'N' || letter == 'O' ||
+        (numbered && !(first_one && (letter == 'S' || letter == 'M'))))
         return refuse(scan, e, i, line, DR_REASON_VALUES);
     return assigned(scan, e, letter, equals + 1, line, 0.0);
 }
@@ -307,7 +307,7 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
 /* Return the place behind a statement or a word with =, i where the letter at i begins a plain word. */
 static int64_t statement_item(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
     const int64_t end = after_name(scan->text, i);
-    if (end > i + 1 && (is_letter(AT(scan->text, i + 1)) || AT(scan->text, i + 1) == CH_UNDERSCORE))
+    if (end > i + 1 && (is_letter(AT(scan->text, i + 1)) || AT(scan->text, i + 1) == '_'))
         return statement(scan, e, i, end, line);
     return word_with_equals(scan, e, i, line);
 }
@@ -316,9 +316,9 @@ static int64_t statement_item(Scan *scan, Evaluation *e, int64_t i, int64_t line
 
 /* Tell whether a letter's numbers are lengths, angles or feeds, which Fanuc reads by their point. */
 static bool has_point_rule(int letter) {
-    return letter >= CH_LETTER_X || (letter >= CH_LETTER_I && letter <= CH_LETTER_K) || letter == CH_LETTER_F ||
-           letter == CH_LETTER_R || letter == CH_LETTER_R - 1 || letter <= CH_LETTER_C || letter == CH_LETTER_E ||
-           (letter > CH_LETTER_T && letter < CH_LETTER_X);
+    return letter >= 'X' || (letter >= 'I' && letter <= 'K') || letter == 'F' ||
+           letter == 'R' || letter == 'R' - 1 || letter <= 'C' || letter == 'E' ||
+           (letter > 'T' && letter < 'X');
 }
 
 /* Tell whether the number of the word at i goes by its point, and, other than 0, has none. */
@@ -327,8 +327,8 @@ bool lacks_point(Bytes text, int64_t i) {
         return false;
     bool zero = true;
     for (i++; i < text.rows && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || is_space(AT(text, i))); i++)
-        zero = zero && !(is_digit(AT(text, i)) && AT(text, i) != CH_DIGIT_0);
-    return !zero && !stands_at(text, i, CH_POINT);
+        zero = zero && !(is_digit(AT(text, i)) && AT(text, i) != '0');
+    return !zero && !stands_at(text, i, '.');
 }
 
 /* Return the place behind the digit of /2, whose / stands before i. */
@@ -347,15 +347,15 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
             put(scan, D_NEXT_POINTLESS, 0.0, line);
         return syntax & D_STATEMENTS ? statement_item(scan, e, i, line) : i;
     }
-    if (syntax & D_MACROS && c == CH_SEMICOLON && !first && is_word_behind(text, i + 1))
+    if (syntax & D_MACROS && c == ';' && !first && is_word_behind(text, i + 1))
         return refuse(scan, e, i, line, DR_REASON_SEMICOLON);
-    if (syntax & D_STATEMENTS && c == CH_PAREN_OPEN) /* behind no name: a comment elsewhere, an alarm on this control */
+    if (syntax & D_STATEMENTS && c == '(') /* behind no name: a comment elsewhere, an alarm on this control */
         return refuse(scan, e, i, line, DR_REASON_PARENTHESES);
-    if (syntax & D_SKIP_LEVEL && c == CH_SLASH && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {
-        put(scan, CH_SLASH, 0.0, line);
+    if (syntax & D_SKIP_LEVEL && c == '/' && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {
+        put(scan, '/', 0.0, line);
         return i + 2;
     }
-    if (syntax & D_HEAD_LINES && first && (c == CH_PERCENT || c == CH_COLON))
+    if (syntax & D_HEAD_LINES && first && (c == '%' || c == ':'))
         return head_line(scan, i, line);
     return syntax & D_DOLLAR_LINES ? dollar_line(scan, e, i, line, first) : i;
 }

@@ -53,7 +53,7 @@ bool take_component(Block *b, int axis, double value) {
     b->vector_named |= 1 << axis;
     b->vector[axis] = value;
     if (repeated)
-        report(b, F_REPEATED_WORD, (Says){.a = CH_LETTER_A + axis});
+        report(b, F_REPEATED_WORD, (Says){.a = 'A' + axis});
     return !repeated;
 }
 
@@ -128,7 +128,7 @@ static bool read_pointless(Block *b) {
         if (!(b->pointless & 1 << index) || !goes_by_point(b, index))
             continue;
         if (b->machine->points == D_POINT_REQUIRED || is_unsure(b, index)) {
-            report(b, F_NO_POINT, (Says){.a = index + CH_LETTER_A, .b = b->word[index]});
+            report(b, F_NO_POINT, (Says){.a = index + 'A', .b = b->word[index]});
             return false;
         }
         if (b->machine->points == D_THOUSANDTHS)
@@ -164,7 +164,7 @@ static bool read_dwell(Block *b) {
 
 /* D0 ends the tool's length and D1 begins it. */
 static bool read_edge(Block *b) {
-    const int d = CH_LETTER_A + 3 - CH_LETTER_A;
+    const int d = 'A' + 3 - 'A';
     if (!b->has[d])
         return true;
     b->has[d] = false;
@@ -210,7 +210,7 @@ static bool count_axis(Block *b, int axis) {
     if (!differs)
         return true;
     if (!known[axis]) {
-        report_unless(b, S_DOUBT_X << axis, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + CH_LETTER_A});
+        report_unless(b, S_DOUBT_X << axis, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + 'A'});
         return false;
     }
     b->word[index] += absolute ? from_base : -from_base;
@@ -230,7 +230,7 @@ static bool count_turn(Block *b, int k) {
         return true;
     const bool known = !(s->rotary_unknown >> k & 1);
     if (!known && !(absolute && by_way & bit)) {
-        report(b, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + CH_LETTER_A});
+        report(b, F_COUNTED_FROM_UNKNOWN, (Says){.a = index + 'A'});
         return false;
     }
     const double here = s->rotary_deg[k];

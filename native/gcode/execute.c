@@ -26,12 +26,12 @@ int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, i
 
 /* Execute a block whose words are known; return the word at which to go on. */
 static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
-    const bool deletable = AT(words->letter, from) == CH_SLASH;
+    const bool deletable = AT(words->letter, from) == '/';
     if (deletable && run->machine->block_delete)
         return next;
     if (run->program->language == D_PROGRAMS_FANUC)
         return macro_block(run, words, from + deletable, to, next);
-    if (run->program->language == D_PROGRAMS_LINUXCNC && from + deletable < to && AT(words->letter, from + deletable) == CH_LETTER_M) {
+    if (run->program->language == D_PROGRAMS_LINUXCNC && from + deletable < to && AT(words->letter, from + deletable) == 'M') {
         const double m = AT(words->value, from + deletable);
         if (m == V_M98)
             return call_program(run, words, from + deletable + 1, to, next);
@@ -46,7 +46,7 @@ static int64_t computed_block(Run *run, const MarkedLine *marked, int64_t next) 
     Program *program = run->program;
     Evaluation e = evaluation_of(run->machine, program, marked->start, run->line, false);
     if (marked->fault != F_OK) /* of a comment */
-        wrong(&e, marked->fault, marked->fault == F_DIALECT_STATEMENT ? DR_REASON_SEMICOLON : CH_PAREN_OPEN, 0.0,
+        wrong(&e, marked->fault, marked->fault == F_DIALECT_STATEMENT ? DR_REASON_SEMICOLON : '(', 0.0,
               marked->start);
     else
         read_line(&e, marked->start, marked->first_message);

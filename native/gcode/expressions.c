@@ -125,20 +125,20 @@ static Operator operator_at(Evaluation *e, int64_t i, int64_t *behind) {
     const Bytes text = e->program->text;
     *behind = i + 1;
     if (e->is_open && e->brackets == 0 &&
-        (i >= e->end || AT(text, i) == CH_PAREN_OPEN || AT(text, i) == CH_SEMICOLON))
+        (i >= e->end || AT(text, i) == '(' || AT(text, i) == ';'))
         return CLOSES;
     if (i >= e->end) {
         wrong(e, F_EXPRESSION, PF_UNCLOSED_BRACKET, 0.0, least(i, e->end - 1));
         return CLOSES;
     }
     switch (AT(text, i)) {
-    case CH_BRACKET_CLOSE: return CLOSES;
-    case CH_PLUS: return (Operator){"+", PLUS, 3};
-    case CH_MINUS: return (Operator){"-", MINUS, 3};
-    case CH_SLASH: return (Operator){"/", OVER, 4};
-    case CH_ASTERISK: {
+    case ']': return CLOSES;
+    case '+': return (Operator){"+", PLUS, 3};
+    case '-': return (Operator){"-", MINUS, 3};
+    case '/': return (Operator){"/", OVER, 4};
+    case '*': {
         const int64_t second = after_blanks(text, i + 1, e->end);
-        if (second >= e->end || AT(text, second) != CH_ASTERISK || is_macro(e))
+        if (second >= e->end || AT(text, second) != '*' || is_macro(e))
             return (Operator){"*", TIMES, 4};
         *behind = second + 1;
         return (Operator){"**", POWER, 5};
@@ -272,7 +272,7 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
     if (is_macro(e))
         return variable_at(e, i);
     *i = after_blanks(text, *i + 1, e->end);
-    if (*i < e->end && AT(text, *i) == CH_LESS) {
+    if (*i < e->end && AT(text, *i) == '<') {
         const int64_t name = name_at(e, i);
         if (name == NO_NAME)
             return 0.0;
@@ -304,12 +304,12 @@ static double parameter_at(Evaluation *e, int64_t *i, bool exists) {
 static double exists_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     const int64_t inside = after_blanks(text, *i + 1, e->end);
-    if (inside >= e->end || AT(text, inside) != CH_HASH)
+    if (inside >= e->end || AT(text, inside) != '#')
         return wrong(e, F_EXPRESSION, PF_NO_PARAMETER, 0.0, inside);
     *i = inside;
     const double value = parameter_at(e, i, true);
     *i = after_blanks(text, *i, e->end);
-    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != CH_BRACKET_CLOSE))
+    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != ']'))
         return wrong(e, F_EXPRESSION, PF_UNCLOSED_BRACKET, 0.0, least(*i, e->end - 1));
     ++*i;
     return value;
@@ -319,10 +319,10 @@ static double exists_at(Evaluation *e, int64_t *i) {
 static double arc_tangent(Evaluation *e, int64_t *i, double y) {
     const Bytes text = e->program->text;
     const int64_t slash = after_blanks(text, *i, e->end);
-    if (slash >= e->end || AT(text, slash) != CH_SLASH)
+    if (slash >= e->end || AT(text, slash) != '/')
         return wrong(e, F_EXPRESSION, PF_NO_SLASH, 0.0, least(slash, e->end - 1));
     *i = after_blanks(text, slash + 1, e->end);
-    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+    if (*i >= e->end || AT(text, *i) != '[')
         return wrong(e, F_EXPRESSION, PF_NO_SLASH, 0.0, slash);
     if (is_macro(e) && y < 0.0)
         return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_ATAN, y, slash);
@@ -335,7 +335,7 @@ static double call_at(Evaluation *e, int64_t *i) {
     const Function function = function_at(e, i);
     if (function == FUNCTIONS)
         return wrong(e, F_EXPRESSION, PF_UNKNOWN_FUNCTION, 0.0, place);
-    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+    if (*i >= e->end || AT(text, *i) != '[')
         return wrong(e, F_EXPRESSION, PF_NO_BRACKET, 0.0, place);
     if (function == EXISTS)
         return exists_at(e, i);
@@ -353,12 +353,12 @@ bool begins_value(Bytes text, int64_t i, int64_t end) {
         i++;
     if (i >= end)
         return false;
-    if (AT(text, i) == CH_HASH || AT(text, i) == CH_BRACKET_OPEN)
+    if (AT(text, i) == '#' || AT(text, i) == '[')
         return true;
     int64_t letters = 0;
     for (; i < end && (is_letter(AT(text, i)) || is_blank(AT(text, i))); i++)
         letters += is_letter(AT(text, i));
-    return letters > 1 && i < end && AT(text, i) == CH_BRACKET_OPEN;
+    return letters > 1 && i < end && AT(text, i) == '[';
 }
 
 /* A value behind its signs. */
@@ -366,22 +366,22 @@ static double unsigned_value(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     const uint8_t c = AT(text, *i);
     e->is_null = false;
-    if (c == CH_BRACKET_OPEN)
+    if (c == '[')
         return bracket_at(e, i);
-    if (c == CH_HASH)
+    if (c == '#')
         return parameter_at(e, i, false);
     if (is_letter(c)) {
         const double value = call_at(e, i);
         e->is_null = false;
         return value;
     }
-    if (!is_digit(c) && c != CH_POINT)
+    if (!is_digit(c) && c != '.')
         return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, *i);
     const Number read = number(text, *i);
     if (read.digits == 0)
         return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, *i);
     if (read.finding != F_OK)
-        return wrong(e, read.finding, CH_HASH, 0.0, *i);
+        return wrong(e, read.finding, '#', 0.0, *i);
     *i = read.end;
     return read.value;
 }
@@ -393,7 +393,7 @@ double value_at(Evaluation *e, int64_t *i) {
     bool negative = false;
     for (*i = after_blanks(text, *i, e->end); *i < e->end && is_sign(AT(text, *i));
          *i = after_blanks(text, *i + 1, e->end))
-        negative ^= AT(text, *i) == CH_MINUS;
+        negative ^= AT(text, *i) == '-';
     if (*i >= e->end)
         return wrong(e, F_EXPRESSION, PF_NO_VALUE, 0.0, least(place, e->end - 1));
     if (e->depth >= MOST_DEPTH)
@@ -417,12 +417,12 @@ void assignment_at(Evaluation *e, int64_t *i) {
     *i = after_blanks(text, *i + 1, e->end);
     if (is_macro(e))
         made.number = variable_number(e, i, place);
-    else if (*i < e->end && AT(text, *i) == CH_LESS)
+    else if (*i < e->end && AT(text, *i) == '<')
         made.name = name_at(e, i);
     else
         made.number = parameter_number(e, i);
     *i = after_blanks(text, *i, e->end);
-    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != CH_EQUALS))
+    if (e->finding == F_OK && (*i >= e->end || AT(text, *i) != '='))
         wrong(e, F_EXPRESSION, PF_NO_EQUALS, 0.0, place);
     if (e->finding != F_OK)
         return;

@@ -53,7 +53,7 @@ bool line_ends(Evaluation *e, int64_t i) {
 double bracket_value(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     *i = after_blanks(text, *i, e->end);
-    if (*i >= e->end || AT(text, *i) != CH_BRACKET_OPEN)
+    if (*i >= e->end || AT(text, *i) != '[')
         return wrong(e, F_EXPRESSION, PF_NO_BRACKET, 0.0, least(*i, e->end - 1));
     return value_at(e, i);
 }
@@ -269,7 +269,7 @@ static int64_t call_subprogram(Run *run, const MarkedLine *marked, int64_t next)
     int64_t i, count = 0;
     const int64_t row = called_row(run, &e, marked, &i);
     const Bytes text = run->program->text;
-    for (i = after_comments(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+    for (i = after_comments(text, i, e.end); e.finding == F_OK && i < e.end && AT(text, i) == '[';
          i = after_comments(text, i, e.end)) {
         if (count == P_LOCAL_PARAMETERS)
             wrong(&e, F_O_WORD, PF_FAULT_ARGUMENTS, 0.0, i);
@@ -290,11 +290,11 @@ int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int
     }
     for (int64_t k = from; k < to; k++) {
         const uint8_t letter = AT(words->letter, k);
-        if (letter == CH_LETTER_P && isnan(p))
+        if (letter == 'P' && isnan(p))
             p = AT(words->value, k);
-        else if (letter == CH_LETTER_L)
+        else if (letter == 'L')
             l = AT(words->value, k);
-        else if (letter != CH_PAREN_OPEN)
+        else if (letter != '(')
             return stop_at_fault(run, PF_FAULT_M98_WORDS, next);
     }
     int64_t number, times;
@@ -365,7 +365,7 @@ static int64_t return_from(Run *run, const MarkedLine *marked, int64_t next) {
         return stop_at_fault(run, PF_FAULT_TWO_STYLES, next);
     const Bytes text = run->program->text;
     int64_t i = after_blanks(text, marked->expression, e.end);
-    const bool has_value = i < e.end && AT(text, i) == CH_BRACKET_OPEN;
+    const bool has_value = i < e.end && AT(text, i) == '[';
     const double value = has_value ? value_at(&e, &i) : 0.0;
     if (!line_ends(&e, i))
         return stop_wrong(run, &e, marked->start, next);

@@ -49,9 +49,9 @@ bool repeats_itself(Run *run, int64_t word) {
 bool writes_tables(const Words *words, int64_t from, int64_t to) {
     for (int64_t k = from; k < to; k++) {
         const double value = AT(words->value, k);
-        if (AT(words->letter, k) == CH_LETTER_G && value >= V_G10 / V_TENFOLD && value < V_G10 / V_TENFOLD + 1.0)
+        if (AT(words->letter, k) == 'G' && value >= V_G10 / V_TENFOLD && value < V_G10 / V_TENFOLD + 1.0)
             return true;
-        if (AT(words->letter, k) == CH_LETTER_M && value >= V_M70 && value <= V_M73)
+        if (AT(words->letter, k) == 'M' && value >= V_M70 && value <= V_M73)
             return true;
     }
     return false;

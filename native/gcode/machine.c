@@ -40,10 +40,10 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
         const double value = AT(words->value, k);
         int bit = 0;
         switch (AT(words->letter, k)) {
-        case CH_LETTER_X: x = value, bit = X_NAMED; break;
-        case CH_LETTER_Y: y = value, bit = Y_NAMED; break;
-        case CH_LETTER_Z: z = value, bit = Z_NAMED; break;
-        case CH_LETTER_F: feed = value * s->unit_mm, bit = machine->rotary_axes ? 0 : F_NAMED; break;
+        case 'X': x = value, bit = X_NAMED; break;
+        case 'Y': y = value, bit = Y_NAMED; break;
+        case 'Z': z = value, bit = Z_NAMED; break;
+        case 'F': feed = value * s->unit_mm, bit = machine->rotary_axes ? 0 : F_NAMED; break;
         }
         if (bit == 0 || named & bit)
             return false;

@@ -62,7 +62,7 @@ int64_t go_to_number(Run *run, const MarkedLine *marked, int64_t next) {
 static int64_t calculate(Run *run, const MarkedLine *marked, Evaluation *e, int64_t i, int64_t next) {
     const Bytes text = e->program->text;
     i = after_blanks(text, i, e->end);
-    if (i >= e->end || AT(text, i) != CH_HASH)
+    if (i >= e->end || AT(text, i) != '#')
         wrong(e, F_EXPRESSION, PF_MACRO_BEHIND_THEN, 0.0, least(i, e->end - 1));
     else
         assignment_at(e, &i);
@@ -106,17 +106,17 @@ int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
 /* Return the variable of an argument, 0 where the letter is none. */
 static int variable_of(uint8_t letter) {
     static const uint8_t VARIABLE[] = {1, 2, 3, 7, 8, 9, 0, 11, 4, 5, 6, 0, 13, 0, 0, 0, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26};
-    return letter >= CH_LETTER_A && letter <= CH_LETTER_Z ? VARIABLE[letter - CH_LETTER_A] : 0;
+    return letter >= 'A' && letter <= 'Z' ? VARIABLE[letter - 'A'] : 0;
 }
 
 /* Take one word behind G65: P or an argument; return a fault, -1 = none. */
 static int take_argument(uint8_t letter, double value, double *p, double arguments[P_MACRO_LOCALS]) {
     enum { NO_FAULT = -1, FIRST_OF_CENTRE = 4, LAST_OF_CENTRE = 6 };
-    if (letter == CH_PAREN_OPEN)
+    if (letter == '(')
         return NO_FAULT;
     if (letter == D_NEXT_POINTLESS)
         return PF_FAULT_MACRO_POINT;
-    if (letter == CH_LETTER_P && isnan(*p)) {
+    if (letter == 'P' && isnan(*p)) {
         *p = value;
         return NO_FAULT;
     }
@@ -157,11 +157,11 @@ static bool called(const Words *words, int64_t from, int64_t to, int64_t *number
     double p = NAN, l = NAN;
     for (int64_t k = from; k < to; k++) {
         const uint8_t letter = AT(words->letter, k);
-        if (letter == CH_LETTER_P && isnan(p))
+        if (letter == 'P' && isnan(p))
             p = AT(words->value, k);
-        else if (letter == CH_LETTER_L && isnan(l))
+        else if (letter == 'L' && isnan(l))
             l = AT(words->value, k);
-        else if (letter != CH_PAREN_OPEN)
+        else if (letter != '(')
             return false;
     }
     *times = 1;
@@ -217,11 +217,11 @@ int64_t macro_block(Run *run, const Words *words, int64_t from, int64_t to, int6
     for (int64_t k = from; k < to; k++) {
         const uint8_t letter = AT(words->letter, k);
         const double value = AT(words->value, k);
-        if (letter == CH_LETTER_G && value == G65)
+        if (letter == 'G' && value == G65)
             return k == from ? call_macro(run, words, k + 1, to, next) : stop_at_fault(run, PF_FAULT_MACRO_WORDS, next);
-        if (letter == CH_LETTER_M && value == V_M98)
+        if (letter == 'M' && value == V_M98)
             return call_behind(run, words, from, k, to, next);
-        if (letter == CH_LETTER_M && value == V_M99)
+        if (letter == 'M' && value == V_M99)
             return end_behind(run, words, from, k, to, next);
     }
     return from < to ? block_of_words(run, words, from, to, next) : next;

@@ -32,7 +32,7 @@ static int fault_of(int64_t number) {
 int64_t variable_number(Evaluation *e, int64_t *i, int64_t place) {
     const Bytes text = e->program->text;
     int64_t number = 0;
-    if (*i < e->end && AT(text, *i) == CH_LESS) {
+    if (*i < e->end && AT(text, *i) == '<') {
         wrong(e, F_EXPRESSION, PF_MACRO_NAME, 0.0, place);
         return 0;
     }

@@ -13,18 +13,18 @@ Number any_number(Bytes text, int64_t i) {
         if (is_digit(c)) {
             started = true;
             read.digits++;
-            significant += significant > 0 || c != CH_DIGIT_0;
+            significant += significant > 0 || c != '0';
             if (significant <= MOST_DIGITS) {
-                mantissa = mantissa * 10 + (c - CH_DIGIT_0);
+                mantissa = mantissa * 10 + (c - '0');
                 read.decimals += point;
             } else if (!point) {
                 read.finding = F_NUMBER_TOO_LONG;
             }
-        } else if (c == CH_POINT && !point) {
+        } else if (c == '.' && !point) {
             point = started = true;
         } else if (is_sign(c) && !started) {
             started = true;
-            negative = c == CH_MINUS;
+            negative = c == '-';
         } else if (!is_space(c)) {
             break;
         }
@@ -44,7 +44,7 @@ bool is_line_number(Bytes text, int64_t i, int64_t end) {
         const uint8_t c = AT(text, i);
         if (is_sign(c))
             return false;
-        if (c == CH_POINT) {
+        if (c == '.') {
             point = true;
         } else if (!is_blank(c)) {
             before += !point;

@@ -24,7 +24,7 @@ bool is_line_number(Bytes text, int64_t i, int64_t end);
 /* Add the digits from i on to a mantissa; return the place behind. */
 static inline int64_t add_digits(Bytes text, int64_t i, int64_t *mantissa) {
     for (; i < text.rows && is_digit(AT(text, i)); i++)
-        *mantissa = (int64_t)((uint64_t)*mantissa * 10 + (AT(text, i) - CH_DIGIT_0));
+        *mantissa = (int64_t)((uint64_t)*mantissa * 10 + (AT(text, i) - '0'));
     return i;
 }
 
@@ -32,11 +32,11 @@ static inline int64_t add_digits(Bytes text, int64_t i, int64_t *mantissa) {
 static inline Number number(Bytes text, int64_t i) {
     const int64_t start = i;
     int64_t mantissa = 0, decimals = 0;
-    const bool negative = i < text.rows && AT(text, i) == CH_MINUS;
+    const bool negative = i < text.rows && AT(text, i) == '-';
     const int64_t first_digit = i += negative;
     i = add_digits(text, i, &mantissa);
     int64_t digits = i - first_digit;
-    const bool point = i < text.rows && AT(text, i) == CH_POINT;
+    const bool point = i < text.rows && AT(text, i) == '.';
     if (point) {
         const int64_t behind = i + 1;
         i = add_digits(text, behind, &mantissa);
@@ -45,7 +45,7 @@ static inline Number number(Bytes text, int64_t i) {
     }
     while (i < text.rows && is_space(AT(text, i)))
         i++;
-    const bool goes_on = i < text.rows && (is_digit(AT(text, i)) || AT(text, i) == CH_POINT);
+    const bool goes_on = i < text.rows && (is_digit(AT(text, i)) || AT(text, i) == '.');
     if (digits == 0 || digits > MOST_DIGITS || goes_on)
         return any_number(text, start);
     const double value = (negative ? -(double)mantissa : (double)mantissa) / TEN_TO[decimals];

@@ -208,10 +208,10 @@ int64_t name_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     uint8_t name[P_LONGEST_NAME];
     int64_t length = 0, k = *i + 1;
-    for (; k < e->end && AT(text, k) != CH_GREATER; k++) {
+    for (; k < e->end && AT(text, k) != '>'; k++) {
         if (is_blank(AT(text, k)))
             continue;
-        if (AT(text, k) == CH_PAREN_OPEN || AT(text, k) == CH_SEMICOLON) { /* LinuxCNC takes it into the name */
+        if (AT(text, k) == '(' || AT(text, k) == ';') { /* LinuxCNC takes it into the name */
             wrong(e, F_EXPRESSION, PF_NAME_COMMENT, 0.0, k);
             return NO_NAME;
         }
@@ -242,7 +242,7 @@ EXPORT void gcode_set_names(Program *program) {
 /* A name with _ before it is known everywhere, another in its own call of a subprogram only. */
 static bool is_global(const Program *p, int64_t name) {
     const ParameterName *row = &AT(p->names, name);
-    return row->length > 0 && AT(p->pool, row->start) == CH_UNDERSCORE;
+    return row->length > 0 && AT(p->pool, row->start) == '_';
 }
 
 static int64_t generation(const Program *p) { return AT(p->frames, p->course.at->frame).generation; }

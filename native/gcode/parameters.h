@@ -45,8 +45,8 @@ static inline int64_t after_blanks(Bytes text, int64_t i, int64_t end) {
 /* Return the place of the first character from i on that is no blank and in no comment ( ), at most the line's end; a
    line whose comments do not close is never read so far. */
 static inline int64_t after_comments(Bytes text, int64_t i, int64_t end) {
-    for (i = after_blanks(text, i, end); i < end && AT(text, i) == CH_PAREN_OPEN; i = after_blanks(text, i, end))
-        while (i < end && AT(text, i++) != CH_PAREN_CLOSE)
+    for (i = after_blanks(text, i, end); i < end && AT(text, i) == '('; i = after_blanks(text, i, end))
+        while (i < end && AT(text, i++) != ')')
             ;
     return i;
 }
@@ -54,7 +54,7 @@ static inline int64_t after_comments(Bytes text, int64_t i, int64_t end) {
 /* Tell whether nothing but comments stands in a line from i on. */
 static inline bool is_rest_comment(Bytes text, int64_t i, int64_t end) {
     i = after_comments(text, i, end);
-    return i >= end || AT(text, i) == CH_SEMICOLON;
+    return i >= end || AT(text, i) == ';';
 }
 
 /* Tell whether a word stands at i, such as X5 or X#1: behind ; it is the next block on a Fanuc, and prose is not. */
@@ -64,8 +64,8 @@ static inline bool is_word_behind(Bytes text, int64_t i) {
     if (i >= end || !is_letter(AT(text, i)))
         return false;
     i = after_blanks(text, i + 1, end);
-    return i < end && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || AT(text, i) == CH_POINT ||
-                       AT(text, i) == CH_HASH || AT(text, i) == CH_BRACKET_OPEN);
+    return i < end && (is_digit(AT(text, i)) || is_sign(AT(text, i)) || AT(text, i) == '.' ||
+                       AT(text, i) == '#' || AT(text, i) == '[');
 }
 
 enum { NO_NAME = -1 };

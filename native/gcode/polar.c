@@ -31,7 +31,7 @@ bool polar_is_sound(Block *b) {
     if (s->plane != V_PLANE_XY)
         report_unless(b, S_DOUBT_PLANE, FP_PLANE, (Says){.a = s->plane});
     else if (b->has[V_WORD_X] || b->has[V_WORD_Y])
-        report(b, FP_WITH_AXIS, (Says){.a = b->has[V_WORD_X] ? CH_LETTER_X : CH_LETTER_Y});
+        report(b, FP_WITH_AXIS, (Says){.a = b->has[V_WORD_X] ? 'X' : 'Y'});
     else if (b->g[V_NON_MODAL] == V_G53)
         report(b, FP_G53, (Says){0});
     else if (at_zero && !(both && s->absolute))

@@ -33,8 +33,8 @@ static void put_item(const Evaluation *e, const Item *item, int64_t *message) {
         put(e, V_MARK, item->finding);
         if (item->lost > 0)
             put(e, item->lost + V_UNREAD_NUMBER, 0.0);
-    } else if (item->kind == CH_PAREN_OPEN) {
-        put(e, CH_PAREN_OPEN, (double)(*message)++);
+    } else if (item->kind == '(') {
+        put(e, '(', (double)(*message)++);
     } else if (item->kind > LINE_NUMBER) {
         put(e, item->kind, 0.0);
     }
@@ -46,7 +46,7 @@ static Item letter_at(Evaluation *e, int64_t *i, bool first) {
     const Bytes text = e->program->text;
     const int letter = AT(text, *i) & ~CH_CASE_BIT;
     const Number behind = number(text, *i + 1);
-    if (letter != CH_LETTER_N && letter != CH_LETTER_O) {
+    if (letter != 'N' && letter != 'O') {
         if (behind.digits > 0 && behind.finding == F_OK) {
             if (is_macro(e) && lacks_point(text, *i))
                 put(e, D_NEXT_POINTLESS, 0.0);
@@ -73,7 +73,7 @@ static Item letter_at(Evaluation *e, int64_t *i, bool first) {
 static int64_t calculation_at(Evaluation *e, int64_t i) {
     const Course *at = e->program->course.at;
     const int64_t place = i;
-    const bool is_alone = at->words == 0 || (at->words == 1 && AT(e->program->letter, 0) == CH_SLASH);
+    const bool is_alone = at->words == 0 || (at->words == 1 && AT(e->program->letter, 0) == '/');
     if (is_alone)
         assignment_at(e, &i);
     if (!is_alone || (e->finding == F_OK && !is_rest_comment(e->program->text, i, e->end)))
@@ -104,12 +104,12 @@ static void read_siemens_line(Evaluation *e, int64_t start) {
         const int64_t words = scan.words = at->words, behind = dialect_item(&scan, e, i, e->line, first);
         at->words = scan.words;
         if (behind > i) {
-            first = first && (at->words == words || AT(p->letter, words) == CH_SLASH);
+            first = first && (at->words == words || AT(p->letter, words) == '/');
             i = behind;
             continue;
         }
         const bool is_word = begins_word(c);
-        if (c == CH_HASH || (is_word && number(p->text, i + 1).digits == 0 && begins_value(p->text, i + 1, e->end))) {
+        if (c == '#' || (is_word && number(p->text, i + 1).digits == 0 && begins_value(p->text, i + 1, e->end))) {
             wrong(e, F_DIALECT_STATEMENT, DR_REASON_VALUES, 0.0, i);
             return;
         }
@@ -119,7 +119,7 @@ static void read_siemens_line(Evaluation *e, int64_t start) {
         int64_t no_message = 0;
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_DIALECT_STATEMENT, DR_REASON_PROGRAM, 0.0, i);
-        else if (item.kind != CH_PAREN_OPEN)
+        else if (item.kind != '(')
             put_item(e, &item, &no_message);
         first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !is_word;
     }
@@ -146,20 +146,20 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
             continue;
         }
         Item item = {.kind = NOTHING};
-        if (c == CH_HASH && is_macro(e)) {
+        if (c == '#' && is_macro(e)) {
             i = calculation_at(e, i);
-        } else if (c == CH_HASH) {
+        } else if (c == '#') {
             assignment_at(e, &i);
         } else if (begins_word(c)) {
             item = letter_at(e, &i, first);
         } else {
             item = other_item(text, i, first);
-            i = item.kind == CH_SLASH && is_macro(e) ? after_skip_level(text, item.end) : item.end;
+            i = item.kind == '/' && is_macro(e) ? after_skip_level(text, item.end) : item.end;
         }
         if (item.kind == V_PROGRAM_LINE)
             wrong(e, F_O_WORD, PF_FAULT_NOT_FIRST, 0.0, i);
         put_item(e, &item, &first_message);
-        first = first && c != CH_HASH && c != CH_PAREN_OPEN && item.kind != V_MARK && item.kind != LINE_NUMBER &&
+        first = first && c != '#' && c != '(' && item.kind != V_MARK && item.kind != LINE_NUMBER &&
                 !begins_word(c);
     }
 }
@@ -167,7 +167,7 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
 /* Tell whether a line begins with / and such lines are left out. */
 bool is_deleted(const Machine *machine, Bytes text, int64_t start) {
     const int64_t i = after_blanks(text, start, text.rows);
-    return machine->block_delete && i < text.rows && AT(text, i) == CH_SLASH;
+    return machine->block_delete && i < text.rows && AT(text, i) == '/';
 }
 
 /* Report what is wrong with the line from `start` on. */

@@ -168,7 +168,7 @@ void set_tool_number(Block *b) {
     b->used[V_WORD_Q] |= b->has[V_WORD_Q];
     const int32_t tool = b->has[V_WORD_Q] ? whole(b->word[V_WORD_Q]) : NOT_WHOLE;
     if (tool == NOT_WHOLE) {
-        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_Q + CH_LETTER_A});
+        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_Q + 'A'});
         s->doubt |= S_DOUBT_TOOL;
         return;
     }
@@ -209,7 +209,7 @@ void switch_output(Block *b, int32_t m) {
     if (sets_value)
         b->used[V_WORD_Q] |= b->has[V_WORD_Q];
     if (!b->has[number] || whole(b->word[number]) == NOT_WHOLE) {
-        report(b, FM_IO_WORD, (Says){m, number + CH_LETTER_A, b->has[number] ? b->word[number] : NAN});
+        report(b, FM_IO_WORD, (Says){m, number + 'A', b->has[number] ? b->word[number] : NAN});
         return;
     }
     if (sets_value && !b->has[V_WORD_Q]) {

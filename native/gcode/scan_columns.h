@@ -23,7 +23,7 @@ static inline void put_mark(Scan *scan, int finding, double found, int64_t line)
 
 /* Write a message whose text is a span of bytes. */
 static inline void put_message(Scan *scan, int64_t start, int64_t end, int64_t line) {
-    put(scan, CH_PAREN_OPEN, (double)scan->messages, line);
+    put(scan, '(', (double)scan->messages, line);
     CELL(scan->message_span, scan->messages, 0) = start;
     CELL(scan->message_span, scan->messages, 1) = end;
     scan->messages++;

@@ -67,7 +67,7 @@ static void select_tool(Block *b, double t) {
     b->used[V_WORD_T] = true;
     const int32_t tool = whole(t);
     if (tool == NOT_WHOLE) {
-        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_T + CH_LETTER_A});
+        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_T + 'A'});
         b->state->doubt |= S_DOUBT_TOOL;
         return;
     }
@@ -107,7 +107,7 @@ static void apply_length(Block *b) {
         b->used[V_WORD_H] = true;
         tool = whole(b->word[V_WORD_H]);
         if (tool == NOT_WHOLE) {
-            report(b, F_BAD_INTEGER, (Says){.a = V_WORD_H + CH_LETTER_A});
+            report(b, F_BAD_INTEGER, (Says){.a = V_WORD_H + 'A'});
             s->doubt |= S_DOUBT_Z;
             return;
         }

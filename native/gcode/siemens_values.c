@@ -23,7 +23,7 @@ static int64_t behind_blanks(const Evaluation *e, int64_t i) { return after_blan
 static int64_t r_number(Evaluation *e, int64_t i, int64_t behind, int64_t place) {
     int64_t number = 0;
     for (int64_t k = i; k < behind && number <= P_MOST_R; k++)
-        number = number * 10 + (AT(e->program->text, k) - CH_DIGIT_0);
+        number = number * 10 + (AT(e->program->text, k) - '0');
     if (number >= P_MOST_R)
         wrong(e, F_EXPRESSION_VALUE, PF_SIEMENS_R, (double)number, place);
     return number < P_MOST_R ? number : 0;
@@ -70,7 +70,7 @@ static Function function_at(const Evaluation *e, int64_t *i) {
             if ((is_digit((uint8_t)*name) ? AT(e->program->text, k) : AT(e->program->text, k) | CH_CASE_BIT) != (uint8_t)*name)
                 break;
         k = behind_blanks(e, k);
-        if (*name || !stands_at(e, k, CH_PAREN_OPEN))
+        if (*name || !stands_at(e, k, '('))
             continue;
         *i = k + 1;
         return function;
@@ -107,11 +107,11 @@ static double call_at(Evaluation *e, int64_t *i, Function function, int64_t plac
     const double first = expression(e, i);
     double second = 0.0;
     if (function == ATAN2) {
-        require(e, i, CH_COMMA, PF_SIEMENS_ATAN2);
+        require(e, i, ',', PF_SIEMENS_ATAN2);
         if (e->finding == F_OK)
             second = expression(e, i);
     }
-    require(e, i, CH_PAREN_CLOSE, PF_SIEMENS_BRACKET);
+    require(e, i, ')', PF_SIEMENS_BRACKET);
     if (e->finding != F_OK)
         return 0.0;
     return function == ATAN2 ? degrees(atan2(first + 0.0, second)) : function_of(e, function, first, place);
@@ -122,13 +122,13 @@ static double call_at(Evaluation *e, int64_t *i, Function function, int64_t plac
 static double unsigned_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     const int64_t place = *i;
-    if (stands_at(e, *i, CH_PAREN_OPEN)) {
+    if (stands_at(e, *i, '(')) {
         ++*i;
         const double value = expression(e, i);
-        require(e, i, CH_PAREN_CLOSE, PF_SIEMENS_BRACKET);
+        require(e, i, ')', PF_SIEMENS_BRACKET);
         return value;
     }
-    if (*i + 1 < e->end && (AT(text, *i) & ~CH_CASE_BIT) == CH_LETTER_R && is_digit(AT(text, *i + 1))) {
+    if (*i + 1 < e->end && (AT(text, *i) & ~CH_CASE_BIT) == 'R' && is_digit(AT(text, *i + 1))) {
         int64_t behind = *i + 1;
         while (behind < e->end && is_digit(AT(text, behind)))
             behind++;
@@ -138,7 +138,7 @@ static double unsigned_at(Evaluation *e, int64_t *i) {
     const Function function = *i < e->end && is_letter(AT(text, *i)) ? function_at(e, i) : FUNCTIONS;
     if (function != FUNCTIONS)
         return call_at(e, i, function, place);
-    if (*i >= e->end || !(is_digit(AT(text, *i)) || AT(text, *i) == CH_POINT))
+    if (*i >= e->end || !(is_digit(AT(text, *i)) || AT(text, *i) == '.'))
         return wrong(e, F_EXPRESSION, PF_SIEMENS_VALUE, 0.0, least(*i, e->end - 1));
     const Number read = number(text, *i);
     if (read.digits == 0 || read.finding != F_OK)
@@ -150,7 +150,7 @@ static double unsigned_at(Evaluation *e, int64_t *i) {
 static double value_behind_signs(Evaluation *e, int64_t *i) {
     bool negative = false;
     for (*i = behind_blanks(e, *i); *i < e->end && is_sign(AT(e->program->text, *i)); *i = behind_blanks(e, *i + 1))
-        negative ^= AT(e->program->text, *i) == CH_MINUS;
+        negative ^= AT(e->program->text, *i) == '-';
     if (e->depth >= MOST_DEPTH)
         return wrong(e, F_EXPRESSION, PF_TOO_DEEP, 0.0, least(*i, e->end - 1));
     e->depth++;
@@ -163,7 +163,7 @@ static double product(Evaluation *e, int64_t *i) {
     double left = value_behind_signs(e, i);
     while (e->finding == F_OK) {
         const int64_t place = behind_blanks(e, *i);
-        const bool times = stands_at(e, place, CH_ASTERISK), over = stands_at(e, place, CH_SLASH);
+        const bool times = stands_at(e, place, '*'), over = stands_at(e, place, '/');
         if (!times && !over)
             break;
         *i = place + 1;
@@ -179,7 +179,7 @@ static double sum(Evaluation *e, int64_t *i) {
     double left = product(e, i);
     while (e->finding == F_OK) {
         const int64_t place = behind_blanks(e, *i);
-        const bool plus = stands_at(e, place, CH_PLUS), minus = stands_at(e, place, CH_MINUS);
+        const bool plus = stands_at(e, place, '+'), minus = stands_at(e, place, '-');
         if (!plus && !minus)
             break;
         *i = place + 1;
@@ -195,13 +195,13 @@ typedef enum { NONE, EQUAL, UNEQUAL, LESS, LESS_OR_EQUAL, GREATER, GREATER_OR_EQ
 
 static Comparison comparison_at(const Evaluation *e, int64_t *i) {
     const int64_t place = behind_blanks(e, *i);
-    const bool equals = stands_at(e, place + 1, CH_EQUALS);
+    const bool equals = stands_at(e, place + 1, '=');
     Comparison found = NONE;
-    if (stands_at(e, place, CH_EQUALS) && equals)
+    if (stands_at(e, place, '=') && equals)
         found = EQUAL;
-    else if (stands_at(e, place, CH_LESS))
-        found = stands_at(e, place + 1, CH_GREATER) ? UNEQUAL : equals ? LESS_OR_EQUAL : LESS;
-    else if (stands_at(e, place, CH_GREATER))
+    else if (stands_at(e, place, '<'))
+        found = stands_at(e, place + 1, '>') ? UNEQUAL : equals ? LESS_OR_EQUAL : LESS;
+    else if (stands_at(e, place, '>'))
         found = equals ? GREATER_OR_EQUAL : GREATER;
     if (found != NONE)
         *i = place + (found == LESS || found == GREATER ? 1 : 2);

@@ -39,7 +39,7 @@ static bool is_along_tool(Block *b) {
         const int index = V_WORD_X + axis;
         if (!b->has[index] || b->word[index] == 0.0)
             continue;
-        report(b, FO_TOOL_ACROSS, (Says){.a = index + CH_LETTER_A, .b = b->word[index]});
+        report(b, FO_TOOL_ACROSS, (Says){.a = index + 'A', .b = b->word[index]});
         b->state->doubt |= S_DOUBT_POSITION;
         return false;
     }
@@ -70,7 +70,7 @@ void length_added(Block *b) {
     else if (!b->has[V_WORD_H])
         report(b, FO_ADDED_WITHOUT_H, (Says){0});
     else if (tool == NOT_WHOLE)
-        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_H + CH_LETTER_A});
+        report(b, F_BAD_INTEGER, (Says){.a = V_WORD_H + 'A'});
     else {
         const double length_mm = length_of(b->machine, tool);
         if (tool > 0 && isnan(length_mm))

@@ -29,8 +29,8 @@ static int character(Bytes text, int64_t i) {
 static bool is_message(Bytes text, int64_t i, int64_t end) {
     while (i < end && is_space(AT(text, i)))
         i++;
-    return i + 3 <= end && (AT(text, i) | CH_CASE_BIT) == CH_SMALL_M &&
-           (AT(text, i + 1) | CH_CASE_BIT) == CH_SMALL_S && (AT(text, i + 2) | CH_CASE_BIT) == CH_SMALL_G;
+    return i + 3 <= end && (AT(text, i) | CH_CASE_BIT) == 'm' &&
+           (AT(text, i + 1) | CH_CASE_BIT) == 's' && (AT(text, i + 2) | CH_CASE_BIT) == 'g';
 }
 
 /* Return the item of the comment that opens at i. */
@@ -38,13 +38,13 @@ static Item comment(Bytes text, int64_t i) {
     int64_t end = i + 1;
     int depth = 1;
     bool nested = false;
-    for (; end < text.rows && AT(text, end) != CH_NEWLINE && depth > 0; end++) {
-        nested |= AT(text, end) == CH_PAREN_OPEN;
-        depth += (AT(text, end) == CH_PAREN_OPEN) - (AT(text, end) == CH_PAREN_CLOSE);
+    for (; end < text.rows && AT(text, end) != '\n' && depth > 0; end++) {
+        nested |= AT(text, end) == '(';
+        depth += (AT(text, end) == '(') - (AT(text, end) == ')');
     }
     if (nested || depth > 0)
-        return (Item){V_MARK, nested ? F_COMMENT_NESTED : F_COMMENT_OPEN, CH_PAREN_OPEN, 0, end};
-    return (Item){is_message(text, i + 1, end - 1) ? CH_PAREN_OPEN : NOTHING, F_OK, 0.0, 0, end};
+        return (Item){V_MARK, nested ? F_COMMENT_NESTED : F_COMMENT_OPEN, '(', 0, end};
+    return (Item){is_message(text, i + 1, end - 1) ? '(' : NOTHING, F_OK, 0.0, 0, end};
 }
 
 /* --- items ---------------------------------------------------------------------------------------------- */
@@ -56,9 +56,9 @@ static Item whole_line(Bytes text, int64_t i) {
 
 /* Return the item of a letter at `start` with no number behind it; it ends at i. */
 static Item without_number(Bytes text, int64_t i, int64_t start, int letter) {
-    if (letter == CH_LETTER_O)
+    if (letter == 'O')
         return whole_line(text, i);
-    if (letter == CH_LETTER_N)
+    if (letter == 'N')
         return (Item){V_MARK, F_BAD_LINE_NUMBER, letter, 0, i};
     if (begins_value(text, start + 1, line_end(text, start)))
         return whole_line(text, i);
@@ -80,7 +80,7 @@ Item odd_word(Bytes text, int64_t i, int letter, const Number *behind, bool firs
         return without_number(text, behind->end, i, letter);
     if (behind->finding != F_OK)
         return (Item){V_MARK, behind->finding, letter, letter, behind->end};
-    if (letter == CH_LETTER_O)
+    if (letter == 'O')
         return program_number(text, behind->end, first && behind->plain);
     if (!first)
         return (Item){V_MARK, F_N_NOT_FIRST, letter, 0, behind->end};
@@ -92,13 +92,13 @@ Item odd_word(Bytes text, int64_t i, int letter, const Number *behind, bool firs
 /* Return the item that stands at i and is no letter; `first` where the line has no word before. */
 Item other_item(Bytes text, int64_t i, bool first) {
     const uint8_t c = AT(text, i);
-    if (c == CH_SEMICOLON)
+    if (c == ';')
         return (Item){NOTHING, F_OK, 0.0, 0, line_end(text, i)};
-    if (c == CH_PAREN_OPEN)
+    if (c == '(')
         return comment(text, i);
-    if (c == CH_PERCENT || (c == CH_SLASH && first))
+    if (c == '%' || (c == '/' && first))
         return (Item){c, F_OK, 0.0, 0, i + 1};
-    if (c == CH_HASH) /* #1 = value */
+    if (c == '#') /* #1 = value */
         return whole_line(text, i);
     return (Item){V_MARK, F_BAD_CHARACTER, character(text, i), LETTER_BEFORE, i + 1};
 }
@@ -112,7 +112,7 @@ static int lost_letter(const Scan *scan, int lost, int64_t line) {
     if (scan->words == 0 || AT(scan->line, scan->words - 1) != line)
         return 0;
     const int letter = AT(scan->letter, scan->words - 1);
-    return (letter >= CH_LETTER_A && letter <= CH_LETTER_Z) || is_polar_sign((uint8_t)letter) ? letter : 0;
+    return (letter >= 'A' && letter <= 'Z') || is_polar_sign((uint8_t)letter) ? letter : 0;
 }
 
 /* Tell whether a statement of a macro begins at i, such as IF or GOTO: two letters where a word has one. */
@@ -128,15 +128,15 @@ static int32_t kind_of_line(const Scan *scan, int64_t i) {
     const Bytes text = scan->text;
     const int64_t end = line_end(text, i);
     i = after_blanks(text, i, end);
-    if (i < end && AT(text, i) == CH_SLASH)
+    if (i < end && AT(text, i) == '/')
         i = after_blanks(text, scan->syntax & D_MACROS ? after_skip_level(text, i + 1) : i + 1, end);
-    if (i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_N)
+    if (i < end && (AT(text, i) & ~CH_CASE_BIT) == 'N')
         i = after_blanks(text, number(text, i + 1).end, end);
     if (scan->syntax == 0) /* an O-word behind a comment is refused, but it is none of those that may be passed over */
         i = after_comments(text, i, end);
-    if (scan->syntax & D_MACROS && (begins_statement(text, i, end) || (i < end && AT(text, i) == CH_COLON)))
+    if (scan->syntax & D_MACROS && (begins_statement(text, i, end) || (i < end && AT(text, i) == ':')))
         return P_KIND_O_WORD;
-    return i < end && (AT(text, i) & ~CH_CASE_BIT) == CH_LETTER_O ? P_KIND_O_WORD : P_KIND_BLOCK;
+    return i < end && (AT(text, i) & ~CH_CASE_BIT) == 'O' ? P_KIND_O_WORD : P_KIND_BLOCK;
 }
 
 /* Write the line that begins at `start` as one word; what has been read of it is dropped, but for messages. */
@@ -145,7 +145,7 @@ static void put_line(Scan *scan, int64_t start, int64_t line) {
     for (; scan->words > 0 && AT(scan->line, scan->words - 1) == line; scan->words--) {
         const uint8_t c = AT(scan->letter, scan->words - 1);
         scan->marks -= c == V_MARK;
-        first_message -= c == CH_PAREN_OPEN;
+        first_message -= c == '(';
     }
     if (scan->program_lines < scan->lines.rows)
         AT(scan->lines, scan->program_lines) =
@@ -159,14 +159,14 @@ static void put_line(Scan *scan, int64_t start, int64_t line) {
 /* Keep the spans of the message comments from i to the end of the line; return what is wrong with a comment. */
 static int put_messages(Scan *scan, int64_t i, int64_t end) {
     for (; i < end; i++) {
-        if (AT(scan->text, i) == CH_SEMICOLON)
+        if (AT(scan->text, i) == ';')
             return scan->syntax & D_MACROS && is_word_behind(scan->text, i + 1) ? F_DIALECT_STATEMENT : F_OK;
-        if (AT(scan->text, i) != CH_PAREN_OPEN)
+        if (AT(scan->text, i) != '(')
             continue;
         const Item item = comment(scan->text, i);
         if (item.kind == V_MARK)
             return item.finding;
-        if (item.kind == CH_PAREN_OPEN) {
+        if (item.kind == '(') {
             CELL(scan->message_span, scan->messages, 0) = i + 1;
             CELL(scan->message_span, scan->messages, 1) = item.end - 1;
             scan->messages++;
@@ -195,7 +195,7 @@ static void put_item(Scan *scan, const Item *item, int64_t start, int64_t line, 
             put_mark(scan, item->finding, item->found, line);
         if (lost > 0)
             put(scan, lost + V_UNREAD_NUMBER, 0.0, line);
-    } else if (item->kind == CH_PAREN_OPEN) {
+    } else if (item->kind == '(') {
         put_message(scan, start + 1, item->end - 1, line);
     } else if (item->kind > LINE_NUMBER) {
         put(scan, item->kind, 0.0, line);
@@ -206,7 +206,7 @@ static void put_item(Scan *scan, const Item *item, int64_t start, int64_t line, 
 static bool belongs_to_program(const Scan *scan, const Item *item, uint8_t c) {
     if (item->kind == V_PROGRAM_LINE)
         return true;
-    const bool program_number = item->kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == CH_LETTER_O;
+    const bool program_number = item->kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == 'O';
     return scan->whole_program && (item->kind == V_MARK || program_number);
 }
 
@@ -219,7 +219,7 @@ EXPORT void gcode_scan(Scan *scan) {
     const bool comments_count = scan->syntax == 0 || scan->whole_program;
     for (int64_t i = 0; i < text.rows;) {
         const uint8_t c = AT(text, i);
-        if (c == CH_NEWLINE) {
+        if (c == '\n') {
             if (i - line_start > V_LINE_LIMIT)
                 put_mark(scan, F_LINE_TOO_LONG, V_LINE_LIMIT, line);
             line++;
@@ -236,7 +236,7 @@ EXPORT void gcode_scan(Scan *scan) {
             const int64_t words = scan->words, behind = dialect_item(scan, NULL, i, line, first);
             needs_line = behind == NEEDS_LINE;
             if (behind > i) {
-                first = first && (scan->words == words || AT(scan->letter, words) == CH_SLASH);
+                first = first && (scan->words == words || AT(scan->letter, words) == '/');
                 i = behind;
                 continue;
             }
@@ -247,10 +247,10 @@ EXPORT void gcode_scan(Scan *scan) {
         } else if (begins_word(c)) {
             const int letter = c & ~CH_CASE_BIT;
             const Number behind = number(text, i + 1);
-            if (behind.digits > 0 && behind.finding == F_OK && letter != CH_LETTER_N &&
-                letter != CH_LETTER_O) {
+            if (behind.digits > 0 && behind.finding == F_OK && letter != 'N' &&
+                letter != 'O') {
                 put(scan, letter, behind.value, line);
-                if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
+                if (letter >= 'X' && letter <= 'Z')
                     most_decimals = most(most_decimals, behind.decimals);
                 i = behind.end;
                 first = false;
@@ -266,12 +266,12 @@ EXPORT void gcode_scan(Scan *scan) {
             put_comments(scan, i, item.end);
         } else {
             put_item(scan, &item, i, line, marked_line == line);
-            if (scan->syntax & D_MACROS && item.kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == CH_LETTER_O)
+            if (scan->syntax & D_MACROS && item.kind == LINE_NUMBER && (c & ~CH_CASE_BIT) == 'O')
                 put(scan, D_PROGRAM_NUMBER, 0.0, line);
         }
         if (item.kind == V_MARK)
             marked_line = line;
-        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !(c == CH_PAREN_OPEN && comments_count);
+        first = first && item.kind != V_MARK && item.kind != LINE_NUMBER && !(c == '(' && comments_count);
         i = item.end;
     }
     scan->most_decimals = most_decimals;

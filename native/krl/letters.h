@@ -18,10 +18,10 @@ static const double TEN_TO[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
 
 typedef const uint8_t *Place;
 
-static inline bool is_blank(uint8_t c) { return c == CH_SPACE || c == CH_TAB; }
-static inline bool is_digit(uint8_t c) { return c >= CH_DIGIT_0 && c <= CH_DIGIT_9; }
-static inline bool is_axis(uint8_t c) { return c >= CH_DIGIT_1 && c <= CH_DIGIT_6; }
-static inline uint8_t capital(uint8_t c) { return c >= CH_SMALL_A && c <= CH_SMALL_Z ? c - CH_CASE_BIT : c; }
+static inline bool is_blank(uint8_t c) { return c == ' ' || c == '\t'; }
+static inline bool is_digit(uint8_t c) { return c >= '0' && c <= '9'; }
+static inline bool is_axis(uint8_t c) { return c >= '1' && c <= '6'; }
+static inline uint8_t capital(uint8_t c) { return c >= 'a' && c <= 'z' ? c - CH_CASE_BIT : c; }
 static inline bool is(Place at, Place end, uint8_t c) { return at < end && HERE(at, end) == c; }
 
 /* Return the place behind blanks. */
@@ -35,7 +35,7 @@ static inline Place blank(Place at, Place end) {
 static inline Place blank_behind(Place at, Place end) { return blank(at < end ? at + 1 : end, end); }
 
 /* Tell whether nothing but a comment follows. */
-static inline bool ends_here(Place at, Place end) { return at >= end || HERE(at, end) == CH_SEMICOLON; }
+static inline bool ends_here(Place at, Place end) { return at >= end || HERE(at, end) == ';'; }
 
 /* Tell whether a word stands at a place, in capitals or small letters. */
 static inline bool stands(Place at, Place end, const char *word, int length) {
@@ -50,20 +50,20 @@ static inline bool stands(Place at, Place end, const char *word, int length) {
 /* Append digits to a whole number; return the place behind them. */
 static inline Place digits(Place at, Place end, uint64_t *whole) {
     for (; at < end && is_digit(HERE(at, end)); at++)
-        *whole = *whole * 10 + (uint64_t)(HERE(at, end) - CH_DIGIT_0);
+        *whole = *whole * 10 + (uint64_t)(HERE(at, end) - '0');
     return at;
 }
 
 /* Read a number; return the place behind it, NULL and NaN where there is none or it has too many digits. */
 static inline Place number(Place at, Place end, double *value) {
-    const bool negative = is(at, end, CH_MINUS);
-    if (negative || is(at, end, CH_PLUS))
+    const bool negative = is(at, end, '-');
+    if (negative || is(at, end, '+'))
         at++;
     uint64_t whole = 0;
     const Place behind = digits(at, end, &whole);
     int64_t count = behind - at, decimals = 0;
     at = behind;
-    if (is(at, end, CH_POINT)) {
+    if (is(at, end, '.')) {
         at = digits(at + 1, end, &whole);
         decimals = at - behind - 1;
         count += decimals;

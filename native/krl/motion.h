@@ -16,27 +16,27 @@ enum { EXTERNAL_BITS = AXIS_BITS + 6, AXES = ((1 << 6) - 1) << AXIS_BITS };
 static inline Place component(Place at, Place end, int *bit) {
     const uint8_t letter = capital(HERE(at, end));
     at++;
-    if (letter >= CH_LETTER_X && letter <= CH_LETTER_Z)
-        *bit = COLUMN_X + letter - CH_LETTER_X;
-    else if (letter == CH_LETTER_A && at < end && is_axis(HERE(at, end))) {
-        *bit = AXIS_BITS + HERE(at, end) - CH_DIGIT_1;
+    if (letter >= 'X' && letter <= 'Z')
+        *bit = COLUMN_X + letter - 'X';
+    else if (letter == 'A' && at < end && is_axis(HERE(at, end))) {
+        *bit = AXIS_BITS + HERE(at, end) - '1';
         at++;
-    } else if (letter == CH_LETTER_E && at < end && is_axis(HERE(at, end))) {
-        *bit = EXTERNAL_BITS + HERE(at, end) - CH_DIGIT_1;
+    } else if (letter == 'E' && at < end && is_axis(HERE(at, end))) {
+        *bit = EXTERNAL_BITS + HERE(at, end) - '1';
         at++;
-    } else if (letter >= CH_LETTER_A && letter <= CH_LETTER_C)
-        *bit = COLUMN_A + letter - CH_LETTER_A;
-    else if (letter == CH_LETTER_S)
+    } else if (letter >= 'A' && letter <= 'C')
+        *bit = COLUMN_A + letter - 'A';
+    else if (letter == 'S')
         *bit = COLUMN_S;
     else
-        *bit = letter == CH_LETTER_T ? COLUMN_T : NO_COMPONENT;
+        *bit = letter == 'T' ? COLUMN_T : NO_COMPONENT;
     return at;
 }
 
 /* Read `{X 1.0,Y 2.0,…}`, the components found as bits; return the place behind the brace, else NULL. */
 static inline Place components(Place at, Place end, double *value, double *external, int *found) {
     *found = 0;
-    if (!is(at, end, CH_BRACE_OPEN))
+    if (!is(at, end, '{'))
         return NULL;
     for (;;) {
         int bit;
@@ -56,16 +56,16 @@ static inline Place components(Place at, Place end, double *value, double *exter
         else
             SLOT(value, bit >= AXIS_BITS ? bit - AXIS_BITS : bit) = read;
         at = blank(at, end);
-        if (is(at, end, CH_BRACE_CLOSE))
+        if (is(at, end, '}'))
             return at + 1;
-        if (!is(at, end, CH_COMMA))
+        if (!is(at, end, ','))
             return NULL;
     }
 }
 
 /* Tell whether a blank or a brace stands at a place: what is before it is a whole word. */
 static inline bool ends_word(Place at, Place end) {
-    return at < end && (is_blank(HERE(at, end)) || is(at, end, CH_BRACE_OPEN));
+    return at < end && (is_blank(HERE(at, end)) || is(at, end, '{'));
 }
 
 /* Tell whether a statement is a CIRC, and not a name that begins with it. */
@@ -91,7 +91,7 @@ static inline Place passed_point(Place at, Place end, double *value) {
     if (at == NULL || (found & PLACE_BITS) != PLACE_BITS || found > CARTESIAN)
         return NULL;
     at = blank(at, end);
-    return is(at, end, CH_COMMA) ? blank(at + 1, end) : NULL;
+    return is(at, end, ',') ? blank(at + 1, end) : NULL;
 }
 
 /* Read a motion into value and external; of a CIRC its end. Tell in has_external whether there are any. */

@@ -9,7 +9,7 @@ enum { NANO_DECIMALS = 9, SPEED_DECIMALS = 7, MM_DECIMALS = 3, DEG_DECIMALS = 4 
 
 static uint8_t *put_digits(uint8_t *to, int64_t value, int digits) {
     for (int k = digits - 1; k >= 0; k--) {
-        to[k] = (uint8_t)(CH_DIGIT_0 + value % 10);
+        to[k] = (uint8_t)('0' + value % 10);
         value /= 10;
     }
     return to + digits;
@@ -26,11 +26,11 @@ uint8_t *put_fixed(uint8_t *to, double value, int decimals) {
     const int64_t ten = TEN_TO[decimals];
     const int64_t scaled = in_last_decimal(fabs(value), TEN_TO[NANO_DECIMALS - decimals]);
     if (value < 0 && scaled > 0)
-        *to++ = CH_MINUS;
+        *to++ = '-';
     to = put_integer(to, scaled / ten);
     if (decimals == 0)
         return to;
-    *to++ = CH_POINT;
+    *to++ = '.';
     return put_digits(to, scaled % ten, decimals);
 }
 
@@ -64,8 +64,8 @@ static uint8_t *put_external(uint8_t *to, Floats external, int64_t row, int64_t 
         if (!(axes >> k & 1))
             continue;
         to = PUT(to, ",E");
-        *to++ = (uint8_t)(CH_DIGIT_1 + k);
-        *to++ = CH_SPACE;
+        *to++ = (uint8_t)('1' + k);
+        *to++ = ' ';
         to = put_fixed(to, CELL(external, row, k), MM_DECIMALS);
     }
     return to;

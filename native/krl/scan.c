@@ -13,11 +13,11 @@ typedef struct {
 } Line;
 
 static inline Line line_at(Place at, Place end_of_text) {
-    const Place newline = memchr(at, CH_NEWLINE, (size_t)(end_of_text - at));
+    const Place newline = memchr(at, '\n', (size_t)(end_of_text - at));
     Line line = {at, newline ? newline : end_of_text, newline ? newline : end_of_text, NULL};
     line.next = newline ? newline + 1 : end_of_text;
     line.begin = blank(at, line.end);
-    while (line.end > line.begin && (HERE(line.end - 1, line.newline) == CH_RETURN ||
+    while (line.end > line.begin && (HERE(line.end - 1, line.newline) == '\r' ||
                                      is_blank(HERE(line.end - 1, line.newline))))
         line.end--;
     return line;
@@ -25,7 +25,7 @@ static inline Line line_at(Place at, Place end_of_text) {
 
 /* Tell whether a line has no statement: blank, a comment, or one that begins with &. */
 static inline bool is_bare(Line line) {
-    return ends_here(line.begin, line.end) || HERE(line.begin, line.end) == CH_AMPERSAND;
+    return ends_here(line.begin, line.end) || HERE(line.begin, line.end) == '&';
 }
 
 /* Return 1 for a comment that opens a fold, -1 for one that closes it, else 0. */

@@ -24,7 +24,7 @@ static int set_to(Place at, Place end, int kind, double *value) {
     bool sound = true;
     at = blank(at, end);
     if (kind != W_KIND_WAIT_SEC) {
-        sound = is(at, end, CH_EQUALS);
+        sound = is(at, end, '=');
         at = blank_behind(at, end);
     }
     at = number_at(at, end, &SLOT(value, 0));
@@ -44,7 +44,7 @@ static Place written_name(Place at, Place end, Place text, double *value) {
     const Place first = at;
     if (at == NULL)
         return NULL;
-    while (at < end && HERE(at, end) != CH_EQUALS && HERE(at, end) != CH_PAREN_OPEN && !ends_here(at, end))
+    while (at < end && HERE(at, end) != '=' && HERE(at, end) != '(' && !ends_here(at, end))
         at++;
     Place last = at;
     while (last > first && is_blank(HERE(last - 1, end)))
@@ -57,7 +57,7 @@ static Place written_name(Place at, Place end, Place text, double *value) {
 /* Read the numbers of a call from its `(` on; return the place behind `)`, NULL where it is another. */
 static Place arguments(Place at, Place end, double *value) {
     for (int k = 0; k < W_TRIGGER_NUMBERS; k++) {
-        const uint8_t separator = k < W_TRIGGER_NUMBERS - 1 ? CH_COMMA : CH_PAREN_CLOSE;
+        const uint8_t separator = k < W_TRIGGER_NUMBERS - 1 ? ',' : ')';
         at = number_at(blank_behind(at, end), end, &SLOT(value, W_TRIGGER_WRITTEN + k));
         if (at == NULL || !is(at, end, separator))
             return NULL;
@@ -73,7 +73,7 @@ static int trigger(Place at, Place end, Place text, double *value) {
     at = written_name(behind(at, end, W_DO), end, text, value);
     if (at == NULL)
         return 0;
-    const bool calls = HERE(at, end) == CH_PAREN_OPEN;
+    const bool calls = HERE(at, end) == '(';
     if (calls) {
         double prio;
         at = behind(behind(arguments(at, end, value), end, W_PRIO), end, "=");

@@ -97,11 +97,12 @@ def test_leaving_ends_the_workers_at_once():
     began = time.monotonic()
     with Crew(2) as crew:
         for _ in crew.answers(errands.note_time, [0.0, 60.0, 60.0], [0.0] * 3):
-            processes = [worker.process_id for worker in crew._workers]
+            processes = [process for worker in crew._workers for process in worker._pool._processes]
             break
     assert time.monotonic() - began < 30.0
     if os.name == "posix":
-        for process in filter(None, processes):
+        assert len(processes) == 2
+        for process in processes:
             with pytest.raises(ProcessLookupError):
                 os.kill(process, 0)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from gcode2krl.batch.parts import ENDINGS, find_parts
-from gcode2krl.batch.places import alike, program_name, refuse_collisions
+from gcode2krl.batch.planning import alike, program_name, refuse_collisions
 from gcode2krl.errors import NotUnderstoodError
 
 

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from gcode2krl.batch.thumbnail import MOST_POINTS, thumbnail_of
+from gcode2krl.batch.work import MOST_POINTS, thumbnail_of
 from gcode2krl.gcode import read_stream
 
 

@@ -336,9 +336,14 @@ def started(parts, *options, folder):
 
 
 def workers_of(process):
-    """Return the numbers of a process's children."""
+    """Return the numbers of a process's children but loky's tracker of semaphores."""
     listed = Path(f"/proc/{process.pid}/task").glob("*/children")
-    return [int(number) for children in listed for number in children.read_text().split()]
+    children = [int(number) for line in listed for number in line.read_text().split()]
+    return [
+        number
+        for number in children
+        if b"resource_tracker" not in Path(f"/proc/{number}/cmdline").read_bytes()
+    ]
 
 
 def many(parts, count):

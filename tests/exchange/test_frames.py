@@ -1,7 +1,6 @@
 """Tables as frames of polars, pandas and pyarrow, with their units in memory and in the Parquet files."""
 
 import builtins
-import gc
 import subprocess
 import sys
 
@@ -13,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from gcode2krl import Gcode2KrlError, Issue, predict
-from gcode2krl.exchange import Columns, Findings, arrow_stream, arrow_structs, unit_of
+from gcode2krl.exchange import Columns, Findings, unit_of
 from tests.conftest import ROOT
 
 STAGES = ("toolpath", "targets", "motion", "joints", "forces", "deflection")
@@ -113,21 +112,6 @@ def test_arrow_takes_texts_flags_and_empty_tables():
     empty = pa.table(Columns({name: values[:0] for name, values in columns.items()}))
     assert empty.num_rows == 0
     assert empty.schema.field("x_mm").metadata == {b"unit": b"mm"}
-
-
-def test_a_stream_that_nobody_reads_and_one_read_in_part_keep_nothing(prediction):
-    """A leak here would hold every table that was ever handed over."""
-    gc.collect()
-    before = len(arrow_structs._kept), len(arrow_stream._held)
-    for _ in range(20):
-        unread = prediction.motion.__arrow_c_stream__()
-        del unread
-        reader = pa.RecordBatchReader.from_stream(prediction.targets)
-        assert reader.schema.field("speed_mm_s").metadata == {b"unit": b"mm/s"}
-        del reader
-        pa.schema(arrow_stream.SchemaWithUnits(pl.DataFrame({"x_mm": [1.0]}), {"x_mm": "mm"}))
-    gc.collect()
-    assert (len(arrow_structs._kept), len(arrow_stream._held)) == before
 
 
 def test_a_stream_outlives_its_table_and_the_interpreter_ends_quietly():

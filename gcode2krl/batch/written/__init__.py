@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from gcode2krl.batch.written.changes import Change, Difference, difference, with_against
 from gcode2krl.batch.written.index import index_html
 from gcode2krl.batch.written.junit import junit_xml
-from gcode2krl.batch.written.part import Record
-from gcode2krl.batch.written.results import records_of, results_jsonl
+from gcode2krl.batch.written.part import Record, records_of, results_jsonl
 from gcode2krl.batch.written.sarif import findings_sarif
 from gcode2krl.batch.written.summary import summary_md
 

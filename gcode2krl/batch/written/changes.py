@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.part import Part, Record, name_of, parts_of
 
 SAME = 1e-4

@@ -4,14 +4,13 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference, difference
 from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
-from gcode2krl.batch.written.places import quoted
-from gcode2krl.batch.written.text import one_line, printable
-from gcode2krl.batch.written.thumbnail import HEIGHT, WIDTH, svg_path
+from gcode2krl.batch.written.sarif import quoted
 from gcode2krl.batch.written.words import (
     deflection,
     demonstration,
@@ -20,6 +19,8 @@ from gcode2krl.batch.written.words import (
     facts,
     force,
     headline,
+    one_line,
+    printable,
     share,
     time,
 )
@@ -197,3 +198,43 @@ def _natural(name: str) -> tuple[tuple[int, int | str], ...]:
 
 def _text(name: str) -> str:
     return (_HERE / name).read_text(encoding="utf-8")
+
+
+# the path of a part in a few characters of SVG --------------------------------------------------------------
+
+
+WIDTH = 384
+HEIGHT = 256
+"""Steps of the box: four a pixel as it is drawn, finer is not seen."""
+_MARGIN = 12
+
+
+def svg_path(points_mm: Sequence[tuple[float, float]]) -> str:
+    """Return the ``d`` of a path that fills a box of `WIDTH` by `HEIGHT` whole steps, y upwards.
+
+    Empty where there is nothing to draw.
+    """
+    if len(points_mm) < 2:
+        return ""
+    low = [min(point[k] for point in points_mm) for k in (0, 1)]
+    high = [max(point[k] for point in points_mm) for k in (0, 1)]
+    size = [high[k] - low[k] for k in (0, 1)]
+    room = (WIDTH - 2 * _MARGIN, HEIGHT - 2 * _MARGIN)
+    scales = [room[k] / size[k] for k in (0, 1) if size[k] > 0.0]
+    if not scales:
+        return ""
+    scale = min(scales)
+    centre = [0.5 * (low[k] + high[k]) for k in (0, 1)]
+    placed = [
+        (
+            round(0.5 * WIDTH + scale * (x - centre[0])),
+            round(0.5 * HEIGHT - scale * (y - centre[1])),
+        )
+        for x, y in points_mm
+    ]
+    moves = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(placed)]
+    return f"M{_pair(placed[0])}l" + " ".join(_pair(move) for move in moves if move != (0, 0))
+
+
+def _pair(steps: tuple[int, int]) -> str:
+    return f"{steps[0]},{steps[1]}"

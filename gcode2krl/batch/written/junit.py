@@ -8,10 +8,9 @@ what Jenkins, GitLab and GitHub's actions have in common.
 from collections.abc import Iterable
 from xml.etree import ElementTree
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.part import Finding, Part, Record, lines_of, parts_of
-from gcode2krl.batch.written.text import one_line, printable
-from gcode2krl.batch.written.words import demonstration
+from gcode2krl.batch.written.words import demonstration, one_line, printable
 
 _MOST_MESSAGE = 500
 

@@ -4,12 +4,14 @@ A record of an earlier run may come from another version or from a killed one, s
 another kind is unknown, never an error.
 """
 
+import contextlib
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.errors import Issue, Told, told
 
 Record = Mapping[str, Any]
@@ -171,3 +173,39 @@ def _points(stated: Any) -> tuple[tuple[float, float], ...]:
             return ()
         points.append((numbers[0], numbers[1]))
     return tuple(points) if len(points) >= _FEWEST_POINTS else ()
+
+
+# results.jsonl ----------------------------------------------------------------------------------------------
+
+
+def results_jsonl(records: Iterable[Record]) -> bytes:
+    """Return the lines: plain ASCII, keys in alphabetical order, null for what is not a finite number.
+
+    Of several records of one part the last counts.
+    """
+    last = {name_of(record): record for record in records}
+    return b"".join(_line(last[name]) for name in sorted(last))
+
+
+def _line(record: Record) -> bytes:
+    text = json.dumps(_finite(record), sort_keys=True, allow_nan=False)
+    return text.encode("ascii") + b"\n"
+
+
+def records_of(content: bytes) -> list[Record]:
+    """Return the records of a ``results.jsonl``; a line that is no object is left out."""
+    records: list[Record] = []
+    for line in content.splitlines():
+        with contextlib.suppress(ValueError):
+            record = json.loads(line)
+            if isinstance(record, dict):
+                records.append(record)
+    return records
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value

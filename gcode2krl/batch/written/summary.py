@@ -5,10 +5,9 @@ GitHub takes at most 1 MiB; the tables are bounded, and results.jsonl has the re
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from gcode2krl.batch.verdicts import VERDICTS
+from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import difference
 from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
-from gcode2krl.batch.written.text import markdown, one_line
 from gcode2krl.batch.written.words import (
     deflection,
     demonstration,
@@ -17,6 +16,8 @@ from gcode2krl.batch.written.words import (
     facts,
     force,
     headline,
+    markdown,
+    one_line,
     time,
 )
 

@@ -7,7 +7,7 @@ import pytest
 from lxml import html
 
 from gcode2krl.batch.written import index_html
-from gcode2krl.batch.written.thumbnail import HEIGHT, WIDTH, svg_path
+from gcode2krl.batch.written.index import HEIGHT, WIDTH, svg_path
 from tests.batch.written.records import ERROR, NASTY, OF_CELL, WARNING, many, record
 
 

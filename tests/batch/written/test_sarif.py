@@ -9,8 +9,7 @@ import jsonschema
 import pytest
 
 from gcode2krl.batch.written import findings_sarif
-from gcode2krl.batch.written.places import below_root, uri
-from gcode2krl.batch.written.sarif import MOST_RESULTS, SCHEMA
+from gcode2krl.batch.written.sarif import MOST_RESULTS, SCHEMA, below_root, uri
 from gcode2krl.codes import all_codes
 from tests.batch.written.records import ERROR, NASTY, NOTE, OF_CELL, WARNING, many, record
 

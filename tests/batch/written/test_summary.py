@@ -6,7 +6,7 @@ from markdown_it import MarkdownIt
 
 from gcode2krl.batch.written import contents, summary_md
 from gcode2krl.batch.written.summary import MOST_BYTES
-from gcode2krl.batch.written.text import markdown, printable
+from gcode2krl.batch.written.words import markdown, printable
 from tests.batch.written.records import ERROR, NASTY, OF_CELL, WARNING, many, record
 
 READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
