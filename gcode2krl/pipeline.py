@@ -20,7 +20,6 @@ from gcode2krl.cell import Cell, load_cell
 from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.clearance import Beside, collisions_beside, ways_beside
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
@@ -197,8 +196,8 @@ def forecast_toolpath(
     """
     begin("motion and joints")
     planned = plan_course(targets, cell, cell.controller.cycle_s)
-    give_back()
-    course, figures, samples = planned.course, LargestLoads(), PilotSamples(cell)
+    course, figures = planned.course, LargestLoads()
+    samples = PilotSamples(cell, course.count)
     outcome = Outcome(None, None, ())
     if forces:
         tell = begin("material, forces, deflection")
@@ -231,19 +230,16 @@ def forecast_toolpath(
     )
 
 
-def forecast_begun(toolpath: Toolpath, cell: Cell, targets: Targets) -> Forecast:
-    """Return what `forecast_toolpath` will complete: nothing is known of the motion yet."""
-    return Forecast(toolpath, targets, cell, targets.issues, np.nan, np.nan, None, None)
-
-
 def forecast_of(prediction: Prediction) -> Forecast:
     """Return what a program needs of a prediction that has a motion."""
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
-    samples, loads = PilotSamples(prediction.cell), None
+    pilot, loads = None, None
     if motion is not None and forces is not None:
+        samples = PilotSamples(prediction.cell, len(motion))
         line = prediction.toolpath.source_line[motion.move]
         samples.take(motion, line, forces, deflection)
         loads = load_figures(forces, deflection)
+        pilot = samples.force(with_deflection=deflection is not None)
     return Forecast(
         toolpath=prediction.toolpath,
         targets=prediction.targets,
@@ -252,7 +248,7 @@ def forecast_of(prediction: Prediction) -> Forecast:
         time_s=float(motion.time_s[-1]) if motion is not None else np.nan,
         path_mm=float(motion.path_mm[-1]) if motion is not None else np.nan,
         loads=loads,
-        pilot=samples.force(with_deflection=deflection is not None) if loads is not None else None,
+        pilot=pilot,
     )
 
 

@@ -87,9 +87,6 @@ def command(as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """
     order = Order(**options)
     console = Console(quiet or order.output == STANDARD, as_json)
-    from gcode2krl.compiled.long_columns import long_columns_on_disk
-
-    click.get_current_context().with_resource(long_columns_on_disk())  # the summary looks at columns too
     attempt = _attempt(order, console)
     if attempt.page is not None:
         console.hint(f"{attempt.page} written: open it in a browser")
@@ -124,8 +121,7 @@ def _tell(attempt: Attempt, console: Console) -> None:
     if written is None or toolpath is None or forecast is None or joints is None or corner_mm is None:
         raise AssertionError("a written program has run every stage")
     if order.output == STANDARD:
-        for piece in written.contents[f"{written.name}.src"].pieces():
-            write_bytes(piece)
+        write_bytes(written.texts[f"{written.name}.src"])
         console.findings(written.issues, str(order.part))
         return
     console.findings(written.issues, str(order.part))

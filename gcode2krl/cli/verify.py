@@ -69,10 +69,8 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        from gcode2krl.compiled.long_columns import long_columns_on_disk
         from gcode2krl.krl import verify_krl
 
-        click.get_current_context().with_resource(long_columns_on_disk())
         console.heading.reads(program, part)
         refuse_other_start(program, from_line)
         cell, of_job = read_cell_under_job(cell_path, job_path)

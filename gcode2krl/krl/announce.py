@@ -10,9 +10,7 @@ import numpy as np
 from gcode2krl import krc4
 from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.files.spool import let_go
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import most_active, view
 from gcode2krl.krl.cuts import cut_for
@@ -84,12 +82,10 @@ class Planner:
         self.motion = pilot_force(source)
         self.chain = krc4.build_chain(self.targets, self.cell)
         self.windows = windows_of(self.targets, self.chain, self.motion, self.cell)
-        let_go(self.motion)
-        give_back()
 
     def knots(self, tolerance_N: float | None) -> Knots:
         """Return the knots of a tolerance."""
-        knots = knots_of(
+        return knots_of(
             self.motion.time_s,
             self.motion.path_mm,
             self.motion.force_N,
@@ -99,8 +95,6 @@ class Planner:
             tolerance_N=tolerance_N,
             cycle_s=self.cell.controller.cycle_s,
         )
-        let_go(self.motion)
-        return knots
 
     @cached_property
     def whole(self) -> Layout:

@@ -15,7 +15,6 @@ from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
-from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.cell_hashes import StatedCell
@@ -179,11 +178,11 @@ def verify_krl(
     splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
     layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
-    expected = {name: store(pieces) for name, pieces in composed.items()}
+    expected = {name: b"".join(pieces) for name, pieces in composed.items()}
     if not alone:
-        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"].read())
+        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"])
     if online:
-        issues += rsi_file_issues(Path(path), Texts(expected))
+        issues += rsi_file_issues(Path(path), expected)
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
     return compare(program, targets, joints, cell, intended, issues, case, toolpath)
 

@@ -1,6 +1,6 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,11 +10,9 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import CollisionScope, collision_scope
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
-from gcode2krl.files.stored import Stored, Texts
 from gcode2krl.krl.announce import PilotPlan
 from gcode2krl.krl.composition import Layout
 from gcode2krl.krl.draft import Composer, Content
@@ -45,22 +43,17 @@ class WrittenProgram:
 
     name: str
     files: tuple[Path, ...]
-    contents: Mapping[str, Stored]
-    """File name → what it says: `Stored.pieces` yields it without holding the whole."""
+    texts: Mapping[str, bytes]
+    """File name → what it says."""
     report: VerifyReport
     issues: tuple[Issue, ...]
     targets: Targets
     """As written: with the pieces that the pilot force needs."""
 
     @property
-    def texts(self) -> Mapping[str, bytes]:
-        """File name → bytes, read from the files where they are asked for."""
-        return Texts(self.contents)
-
-    @property
     def size_bytes(self) -> int:
         """Bytes of all files."""
-        return sum(text.size_bytes for text in self.contents.values())
+        return sum(map(len, self.texts.values()))
 
     @property
     def pilot(self) -> PilotFigures | None:
@@ -79,10 +72,7 @@ class WrittenProgram:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the files, the read-back, the findings and the path from above."""
-        rows = [
-            ("file", f"{name}, {text.size_bytes / BYTES_PER_MB:.3f} MB")
-            for name, text in self.contents.items()
-        ]
+        rows = [("file", f"{name}, {len(text) / BYTES_PER_MB:.3f} MB") for name, text in self.texts.items()]
         rows.append(("read back", self.report.words()))
         if self.pilot is not None:
             rows.append(("pilot", f"{self.pilot.knots} knots"))
@@ -107,7 +97,6 @@ def write_krl(
     online: str | None = None,
     inputs: Sequence[str | Path] = (),
     toolpath: Toolpath | None = None,
-    complete: Callable[[], Forecast] | None = None,
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
@@ -133,8 +122,6 @@ def write_krl(
         are written beside it. RSI is on from above the first cut to above the last.
     inputs : files and folders that must not be overwritten, beside those that the tables name.
     toolpath : needed with Targets that leave out corners of it; the others have their own.
-    complete : returns the Forecast that ``source`` becomes, for a program without pilot force: it is written
-        and read back while this runs, and again where what is found then changes it.
 
     Raises
     ------
@@ -188,11 +175,8 @@ def write_krl(
     bare = Content(targets, joints)
     with ProgramFiles(file, program_name, [*_inputs(targets, cell), *inputs]) as files:
         composer = Composer(cell, files, original)
-        if complete is not None:
-            source = composer.composed_while(complete, bare, layout(source))
         issues = list(released([*of_name, *source.issues], allow, strict))
         plan = _pilot_plan(source, "none" if arcs or splines else pilot, joints, file is not None)
-        give_back()
         content = bare if plan is None or isinstance(plan, Issue) else Content.of(plan)
         report = composer.composed(content, layout(source))
         failure = _pilot_failure(report) if pilot is None else None
@@ -200,13 +184,11 @@ def write_krl(
             plan, content = left_out(failure), bare
             report = composer.composed(content, layout(source))
         issues += released(_issues_of(plan), (), strict)
-        issues += released(_size_issues(files.contents, content.targets, cell), (), strict)
+        issues += released(_size_issues(files.texts, content.targets, cell), (), strict)
         if not report.ok:
             raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
         written = files.take_places()
-    return WrittenProgram(
-        program_name, tuple(written), files.contents, report, tuple(issues), content.targets
-    )
+    return WrittenProgram(program_name, tuple(written), files.texts, report, tuple(issues), content.targets)
 
 
 def _curves(
@@ -324,10 +306,10 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
     return [name for name in named if name]
 
 
-def _size_issues(contents: Mapping[str, Stored], targets: Targets, cell: Cell) -> list[Issue]:
+def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
     beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
-    program = (text for name, text in contents.items() if not name.endswith(beside))
-    size_mb = sum(text.size_bytes for text in program) / BYTES_PER_MB
+    program = (text for name, text in texts.items() if not name.endswith(beside))
+    size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:
         sentence = (

@@ -29,8 +29,6 @@ from gcode2krl.translation.page import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from gcode2krl.cell import Cell
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
@@ -77,12 +75,9 @@ def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
     ``begin`` is told the name of each stage as it begins. No `Gcode2KrlError` leaves: it is the attempt's
     ``error``, beside what was known when it came. Nothing is printed.
     """
-    from gcode2krl.compiled.long_columns import long_columns_on_disk
-
     known, error = _Known(), None
     try:
-        with long_columns_on_disk():
-            _translate(order, known, begin)
+        _translate(order, known, begin)
     except Gcode2KrlError as refused:
         error = _with_page(order, refused, known)
     return Attempt(order, error, **vars(known))
@@ -102,9 +97,6 @@ def _carry_on(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
     _read(order, ready, known, begin)
     begin("planning")
     _plan(order, ready.cell, known)
-    if order.no_forces and order.compensate is None and order.report is None:
-        known.written = _write_meanwhile(order, ready, known, begin)
-        return
     prediction = _predict(order, ready, known, begin)
     begin("writing and reading back")
     written = _write(order, ready, known, _done(known.forecast))
@@ -152,24 +144,17 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
 
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
-    """Set the targets, and refuse those that a robot cannot run; tables that wait are kept on disk."""
-    from gcode2krl.compiled.memory import give_back
-    from gcode2krl.files.spool import on_disk
+    """Set the targets, and refuse those that a robot cannot run."""
     from gcode2krl.pipeline import judged_targets
 
-    toolpath = _done(known.toolpath)
-    known.targets, joints, known.corner_mm = judged_targets(
-        toolpath, cell, order.tolerance_mm, order.simplify_mm
+    known.targets, known.joints, known.corner_mm = judged_targets(
+        _done(known.toolpath), cell, order.tolerance_mm, order.simplify_mm
     )
     refuse_early(known.targets, cell, order)
-    known.toolpath, known.joints = on_disk(toolpath), on_disk(joints)
-    del toolpath, joints
-    give_back()
 
 
 def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Prediction | None":
     """Foresee motion, forces and deflection; returns whole tables where something needs them."""
-    from gcode2krl.compiled.memory import give_back
     from gcode2krl.pipeline import forecast_of, forecast_toolpath, predict_toolpath, solve_joints
 
     toolpath, targets, forces = _done(known.toolpath), _done(known.targets), not order.no_forces
@@ -186,30 +171,10 @@ def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Predi
         known.forecast = forecast_of(prediction)
     else:
         known.forecast = forecast_toolpath(toolpath, ready.cell, targets, forces=forces, begin=begin)
-    give_back()
     return prediction
 
 
-def _write_meanwhile(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "WrittenProgram":
-    """Write a program whose text does not depend on forces while its motion is planned."""
-    from gcode2krl.pipeline import forecast_begun
-
-    def complete() -> "Forecast":
-        _predict(order, ready, known, begin)
-        begin("writing and reading back")
-        return _done(known.forecast)
-
-    begun = forecast_begun(_done(known.toolpath), ready.cell, _done(known.targets))
-    return _write(order, ready, known, begun, complete)
-
-
-def _write(
-    order: Order,
-    ready: _Ready,
-    known: _Known,
-    forecast: "Forecast",
-    complete: "Callable[[], Forecast] | None" = None,
-) -> "WrittenProgram":
+def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> "WrittenProgram":
     """Write the program and read it back."""
     from gcode2krl.krl import suggested_name, write_krl
 
@@ -229,7 +194,6 @@ def _write(
         pilot=order.pilot,
         online=order.online,
         inputs=ready.inputs,
-        complete=complete,
     )
 
 

@@ -20,7 +20,9 @@ def case():
     cell = load_cell()
     targets = set_targets(read_gcode("examples/raster_finish.nc", cell), cell)
     joints = solve_ptp_joints(targets, cell)
-    return read_texts(compose(targets, joints, cell, "PART", Layout()), "PART.src"), targets, joints, cell
+    files = compose(targets, joints, cell, "PART", Layout())
+    texts = {name: b"".join(pieces) for name, pieces in files.items()}
+    return read_texts(texts, "PART.src"), targets, joints, cell
 
 
 def damaged(program, seed):

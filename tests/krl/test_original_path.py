@@ -235,7 +235,8 @@ def test_no_simplified_program_is_refused(blocks, simplify_mm):
     toolpath = toolpath_of(f"{head}\nF1200\n{body}\nG0 Z20\nM5\nM30\n")
     targets = set_targets(toolpath, CELL, None, simplify_mm)
     joints = solve_ptp_joints(targets, CELL)
-    texts = compose(targets, joints, CELL, "PART", Layout())
+    files = compose(targets, joints, CELL, "PART", Layout())
+    texts = {name: b"".join(pieces) for name, pieces in files.items()}
     report = compare(read_texts(texts, "PART.src"), targets, joints, CELL, original=toolpath)
     assert not [issue for issue in report.issues if issue.code == "verify-original"]
     assert report.original.left_out >= targets.simplified.left_out
