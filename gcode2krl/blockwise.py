@@ -44,6 +44,12 @@ class Planned:
     """Raises `RefusedError` where the motion cannot be cut out of one field."""
     kept: "Kept | None"
 
+    def samples(self) -> "Kept":
+        """Return the samples of a motion that was planned to keep them."""
+        if self.kept is None:
+            raise AssertionError("samples that are asked for are kept")
+        return self.kept
+
 
 class Kept(NamedTuple):
     """The samples of a motion, where they were asked for."""
@@ -54,6 +60,12 @@ class Kept(NamedTuple):
     qd_rad_s: Floats | None
     clearance: Clearance | None
     """None where the cell describes nothing that may hit or be hit."""
+
+    def joints(self, cell: Cell) -> Joints:
+        """Return the joints at the samples, solved here where the planning did not need them."""
+        if self.q_rad is None or self.qd_rad_s is None:
+            return robot.follow_motion(self.motion, cell)
+        return robot.joints_from_angles(self.motion, self.q_rad, self.qd_rad_s, cell)
 
 
 def plan_course(
@@ -86,7 +98,10 @@ def plan_course(
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
     issues += [*seen.acceleration.issues(), *seen.contacts]
-    return Planned(course, tuple(issues), seen.watch.outlook, seen.kept)
+    kept = seen.kept
+    if kept is not None:
+        kept = kept._replace(motion=replace(kept.motion, issues=tuple(issues)))
+    return Planned(course, tuple(issues), seen.watch.outlook, kept)
 
 
 class _Seen(NamedTuple):
@@ -241,7 +256,7 @@ class Loads:
         dt_s: float,
         *,
         has_peaks: bool = True,
-        ways: Callable[[], Sequence[Beside]] = tuple,
+        ways: Sequence[Beside] = (),
     ) -> None:
         """Set up the stock; raises `NotUnderstoodError` where it cannot be read.
 

@@ -12,10 +12,11 @@ import numpy as np
 from gcode2krl import cutting, krc4, program
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, prepare
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError
-from gcode2krl.pipeline import plan_motion, targets_and_joints
-from gcode2krl.tables import Joints, Motion, Restart, Targets, Toolpath
+from gcode2krl.pipeline import plan_motion
+from gcode2krl.tables import Motion, Restart, Toolpath
 
 ABOVE_STOCK_MM = 10.0
 """Least height above the raw part at which the tool arrives: assumed, as the part may stand higher."""
@@ -35,12 +36,15 @@ _MISSING = frozenset({"tool-unknown", "tool-missing"})
 class _Before:
     """The whole program, and what the lines before the restart have left."""
 
-    toolpath: Toolpath
-    targets: Targets
-    joints: Joints
+    plan: Plan
     left: HeightField | None
     to_field: Floats
     """(3, 3) from ``$BASE`` to the frame of the field."""
+
+    @property
+    def toolpath(self) -> Toolpath:
+        """What the G-code says, from its first line on."""
+        return self.plan.toolpath
 
 
 def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | None = None) -> Toolpath:
@@ -78,22 +82,22 @@ def _before(
 ) -> tuple[_Before, list[Issue]]:
     """Return the program up to a row, and what makes its material doubtful or keeps it from being known."""
     _refuse_missing_tools(toolpath, row, cell)
-    targets, joints = targets_and_joints(toolpath, cell, tolerance_mm)
+    plan = prepare(toolpath, cell, tolerance_mm)
     try:
-        motion = plan_motion(targets, cell, cell.controller.cycle_s, watches=False)
+        motion = plan_motion(plan.targets, cell, cell.controller.cycle_s, watches=False)
         field, to_field = cutting.raw_field(toolpath, motion, cell)
         known = Restart(line=0, begins_line=0, left=field)
-        done = _until(motion, krc4.build_chain(targets, cell), row)
+        done = _until(motion, krc4.build_chain(plan.targets, cell), row)
         removal = cutting.remove(replace(toolpath, restart=known), done, cell)
     except Gcode2KrlError as error:
         sentence = f"the material that the lines before have left is not known: {error.issues[0].message}"
         issue = Issue(
             "error", "restart-stock-unknown", 0, sentence, error.issues[0].advice() or "state [stock]"
         )
-        return _Before(toolpath, targets, joints, None, np.eye(3)), [issue]
+        return _Before(plan, None, np.eye(3)), [issue]
     # a rapid has removed what it met, so what is below it would count as cut
     collisions = [issue for issue in removal.forces.issues if issue.code == _UNTRUE]
-    return _Before(toolpath, targets, joints, removal.part, to_field), collisions
+    return _Before(plan, removal.part, to_field), collisions
 
 
 def _until(motion: Motion, chain: krc4.Chain, row: int) -> Motion:
@@ -170,8 +174,8 @@ def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
     if before.left is None or at == row:
         return 0.0
     tip_mm = before.to_field @ before.toolpath.position_mm[at]
-    ends = np.flatnonzero(before.targets.move == at)
-    cdis_mm = float(before.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
+    ends = np.flatnonzero(before.plan.targets.move == at)
+    cdis_mm = float(before.plan.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
     slack_mm = min(0.5 * cdis_mm, _MOST_OF_CORNER_MM)  # no corner is off by more than half of CDIS
     tool = cell.tool[_tool(before, row)]
     return cutting.depth_in_material(before.left, tip_mm, tool, slack_mm)
@@ -179,9 +183,9 @@ def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
 
 def _tool(before: _Before, row: int) -> int:
     """Return the number of the tool whose frame moves in a row; a row that leads nowhere has no target."""
-    move = before.targets.move
+    move = before.plan.targets.move
     so_far = np.flatnonzero((move >= 0) & (move <= row))
-    return int(before.targets.tool[so_far[-1] if len(so_far) else 0])
+    return int(before.plan.targets.tool[so_far[-1] if len(so_far) else 0])
 
 
 def _one_before(toolpath: Toolpath, row: int, first: int) -> Issue:
@@ -255,10 +259,9 @@ def _top(field: HeightField, to_field: Floats) -> float:
 
 def _other_arm(before: _Before, begun: Toolpath, cell: Cell, tolerance_mm: float | None) -> list[Issue]:
     """Return a warning where the arm stands otherwise than in the whole program: its branch, or its spin."""
-    targets, joints = targets_and_joints(begun, cell, tolerance_mm)
-    other = _status(joints, targets) != _status(before.joints, before.targets)
-    here, there = (_last_rotation(each) for each in (targets, before.targets))
-    other |= abs(float(here @ there)) < 1.0 - 1e-9
+    here, there = prepare(begun, cell, tolerance_mm), before.plan
+    other = _status(here) != _status(there)
+    other |= abs(float(_last_rotation(here) @ _last_rotation(there))) < 1.0 - 1e-9
     if not other:
         return []
     sentence = "the arm stands otherwise than in the whole program (S and T, or the spin about the tool axis)"
@@ -266,10 +269,10 @@ def _other_arm(before: _Before, begun: Toolpath, cell: Cell, tolerance_mm: float
     return [Issue("warning", "restart-arm", 0, sentence, remedy)]
 
 
-def _status(joints: Joints, targets: Targets) -> int:
-    return int(joints.status[~targets.home][0])
+def _status(plan: Plan) -> int:
+    return int(plan.joints.status[~plan.targets.home][0])
 
 
-def _last_rotation(targets: Targets) -> Floats:
-    rotation: Floats = targets.rotation[~targets.home][-1]
+def _last_rotation(plan: Plan) -> Floats:
+    rotation: Floats = plan.targets.rotation[~plan.targets.home][-1]
     return rotation

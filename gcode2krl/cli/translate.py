@@ -112,13 +112,8 @@ def _attempt(order: Order, console: Console) -> Attempt:
 def _tell(attempt: Attempt, console: Console) -> None:
     """Print the findings of a written program, and its text or its summary."""
     order, written = attempt.order, attempt.written
-    toolpath, forecast, joints, corner_mm = (
-        attempt.toolpath,
-        attempt.forecast,
-        attempt.joints,
-        attempt.corner_mm,
-    )
-    if written is None or toolpath is None or forecast is None or joints is None or corner_mm is None:
+    plan, forecast, corner_mm = attempt.plan, attempt.forecast, attempt.corner_mm
+    if written is None or plan is None or forecast is None or corner_mm is None:
         raise AssertionError("a written program has run every stage")
     if order.output == STANDARD:
         write_bytes(written.texts[f"{written.name}.src"])
@@ -128,8 +123,8 @@ def _tell(attempt: Attempt, console: Console) -> None:
     from gcode2krl.cli.summary import summary_lines
 
     lines = [
-        *summary_lines(str(order.part), forecast, joints, corner_mm, written),
-        *restart_words(toolpath),
+        *summary_lines(str(order.part), plan, forecast, corner_mm, written),
+        *restart_words(plan.toolpath),
         *(_online_lines(written) if order.online is not None else ()),
     ]
     for line in lines:

@@ -89,12 +89,11 @@ def command(
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         prediction = None
         if compensate == "offline":
-            from gcode2krl.pipeline import judged_targets, predict_toolpath
+            from gcode2krl.chain import collect, prepare
             from gcode2krl.translation.compensation import compensated
 
-            targets, _, _ = judged_targets(toolpath, cell, tolerance_mm, simplify_mm)
-            whole = predict_toolpath(toolpath, cell, targets=targets)
-            prediction = compensated(whole, None)
+            plan, _ = prepare(toolpath, cell, tolerance_mm, simplify_mm).with_corners(tolerance_mm)
+            prediction = compensated(collect(plan), None)
         report = verify_krl(
             program,
             toolpath,

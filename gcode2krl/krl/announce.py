@@ -21,8 +21,6 @@ from gcode2krl.krl.triggers import Triggers, place_triggers
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, PilotHeader, knots_of
 from gcode2krl.pilot.knots import LEAD_DECIMALS
-from gcode2krl.pipeline import forecast_of
-from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints, PilotForce, Targets
 from gcode2krl.units import RAD_PER_DEG
@@ -53,12 +51,12 @@ class PilotPlan:
     issues: tuple[Issue, ...]
 
 
-def pilot_force(source: Prediction | Forecast) -> PilotForce:
+def pilot_force(source: Forecast) -> PilotForce:
     """Return the samples that a pilot force is made from.
 
-    Raises `NotUnderstoodError` for a prediction without forces.
+    Raises `NotUnderstoodError` for a forecast without forces.
     """
-    force = (source if isinstance(source, Forecast) else forecast_of(source)).pilot
+    force = source.pilot
     if force is None:
         sentence = "the prediction has no forces to pilot with"
         raise input_error("option-value", sentence, "predict with a material and stock, or --pilot none")
@@ -76,7 +74,7 @@ class Layout(NamedTuple):
 class Planner:
     """A program and its predicted forces; announces sets of knots in it."""
 
-    def __init__(self, source: Prediction | Forecast, joints: Joints, form: Form, sidecar: bool) -> None:
+    def __init__(self, source: Forecast, joints: Joints, form: Form, sidecar: bool) -> None:
         self.targets, self.joints, self.cell = source.targets, joints, source.cell
         self.form, self.sidecar = form, sidecar
         self.motion = pilot_force(source)

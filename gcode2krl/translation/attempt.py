@@ -14,9 +14,10 @@ from gcode2krl.translation.order import Order
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
+    from gcode2krl.chain import Plan
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Joints, Targets, Toolpath
+    from gcode2krl.tables import Toolpath
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +30,8 @@ class Attempt:
     cell: "Cell | None" = None
     """As resolved, under the job."""
     toolpath: "Toolpath | None" = None
-    targets: "Targets | None" = None
-    joints: "Joints | None" = None
-    """At the targets."""
+    plan: "Plan | None" = None
+    """What the robot would be told, and its joints there."""
     corner_mm: float | None = None
     """The largest corner error."""
     forecast: "Forecast | None" = None

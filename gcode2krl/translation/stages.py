@@ -30,10 +30,11 @@ from gcode2krl.translation.page import (
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
+    from gcode2krl.chain import Plan
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Joints, Targets, Toolpath
+    from gcode2krl.tables import Toolpath
 
 
 _Stage = TypeVar("_Stage")
@@ -45,8 +46,7 @@ class _Known:
 
     cell: "Cell | None" = None
     toolpath: "Toolpath | None" = None
-    targets: "Targets | None" = None
-    joints: "Joints | None" = None
+    plan: "Plan | None" = None
     corner_mm: float | None = None
     forecast: "Forecast | None" = None
     written: "WrittenProgram | None" = None
@@ -145,32 +145,29 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
     """Set the targets, and refuse those that a robot cannot run."""
-    from gcode2krl.pipeline import judged_targets
+    from gcode2krl.chain import prepare
 
-    known.targets, known.joints, known.corner_mm = judged_targets(
-        _done(known.toolpath), cell, order.tolerance_mm, order.simplify_mm
-    )
-    refuse_early(known.targets, cell, order)
+    prepared = prepare(_done(known.toolpath), cell, order.tolerance_mm, order.simplify_mm)
+    known.plan, known.corner_mm = prepared.with_corners(order.tolerance_mm)
+    refuse_early(known.plan.targets, cell, order)
 
 
 def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Prediction | None":
     """Foresee motion, forces and deflection; returns whole tables where something needs them."""
-    from gcode2krl.pipeline import forecast_of, forecast_toolpath, predict_toolpath, solve_joints
+    from gcode2krl.chain import Plan, collect, forecast_of, foresee
 
-    toolpath, targets, forces = _done(known.toolpath), _done(known.targets), not order.no_forces
-    prediction: Prediction | None = None
-    if order.compensate == "offline" or order.report is not None:
-        prediction = predict_toolpath(toolpath, ready.cell, targets=targets, forces=forces, begin=begin)
-    if order.compensate == "offline" and prediction is not None:
+    plan, forces = _done(known.plan), not order.no_forces
+    if order.compensate is None and order.report is None:
+        known.forecast = foresee(plan, forces=forces, begin=begin)
+        return None
+    prediction = collect(plan, forces=forces, begin=begin)
+    if order.compensate == "offline":
         from gcode2krl.translation.compensation import compensated
 
         begin("compensation")
         prediction = compensated(prediction, order.compensate_plot, ready.inputs)
-        known.joints = solve_joints(prediction.targets, ready.cell)
-    if prediction is not None:
-        known.forecast = forecast_of(prediction)
-    else:
-        known.forecast = forecast_toolpath(toolpath, ready.cell, targets, forces=forces, begin=begin)
+        known.plan = Plan.of(plan.toolpath, prediction.targets, ready.cell)
+    known.forecast = forecast_of(prediction)
     return prediction
 
 
@@ -184,7 +181,7 @@ def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> 
     return write_krl(
         forecast,
         ready.place,
-        joints=known.joints,
+        joints=_done(known.plan).joints,
         name=name,
         allow=order.allow,
         guard=not order.no_guard,
@@ -211,7 +208,7 @@ def _with_page(order: Order, error: Gcode2KrlError, known: _Known) -> Gcode2KrlE
         return unwritable
     known.page = page
     if prediction is not None and known.forecast is None:
-        from gcode2krl.pipeline import forecast_of
+        from gcode2krl.chain import forecast_of
 
         known.forecast = forecast_of(prediction)
     return error
