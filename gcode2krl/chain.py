@@ -1,8 +1,8 @@
 """The one chain from a Toolpath to what a program and a prediction are made of.
 
 `prepare` makes a `Plan`: what the robot will be told, and all that is known before it moves. A `Run` is the
-motion of a plan, whose samples pass joints, cutting and compliance in blocks. `collect` keeps every sample and
-returns a Prediction; `foresee` keeps what a program and its summary need and returns a Forecast.
+motion of a plan, whose samples pass joints, cutting and compliance in blocks. `collect` keeps every sample
+and returns a Prediction; `foresee` keeps what a program and its summary need: a Forecast.
 """
 
 import hashlib

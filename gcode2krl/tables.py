@@ -35,7 +35,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Restart:
-    """Where a program begins that does not run from its start (`program.restart`)."""
+    """Where a program begins that does not run from its start (`restart.rows`)."""
 
     line: int
     """G-code line that was asked for."""

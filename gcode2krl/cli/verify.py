@@ -17,7 +17,7 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.translation.from_line import read_from_line, restart_record
+from gcode2krl.translation.inputs import read_from_line
 
 
 @click.command(
@@ -109,6 +109,8 @@ def command(
             raise
         return console.record({"verify": {"max_deviation_mm": None}}, error.issues, exit_code=error.exit_code)
     if as_json:
+        from gcode2krl.restart.rows import restart_record
+
         figures = {"verify": report.as_dict(), **restart_record(toolpath)}
         console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:

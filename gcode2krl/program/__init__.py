@@ -8,13 +8,6 @@ from gcode2krl.program.long_moves import between, straight
 from gcode2krl.program.merging import merged, merging_note
 from gcode2krl.program.orientation import tool_rotation
 from gcode2krl.program.places import Range
-from gcode2krl.program.restart import (
-    approached_row,
-    begun_at,
-    begun_row,
-    row_before,
-    state_words,
-)
 from gcode2krl.program.spin import smooth_spin, stiffest_spin
 from gcode2krl.program.splines import with_stops
 from gcode2krl.program.stations import plan_stations
@@ -25,10 +18,7 @@ from gcode2krl.program.tilts import tilt_issues
 __all__ = [
     "Range",
     "SpinOf",
-    "approached_row",
     "asked_tolerance",
-    "begun_at",
-    "begun_row",
     "below_table",
     "between",
     "check_toolpath",
@@ -40,9 +30,7 @@ __all__ = [
     "plan_stations",
     "plan_targets",
     "require_geometry",
-    "row_before",
     "smooth_spin",
-    "state_words",
     "stiffest_spin",
     "straight",
     "tilt_issues",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.result import cell_of, hashes_of, input_of, record_of
-from gcode2krl.translation.from_line import restart_record
 from gcode2krl.translation.inputs import STANDARD, StandardInput
 from gcode2krl.translation.order import Order
 
@@ -56,7 +55,11 @@ class Attempt:
     @cached_property
     def record(self) -> dict[str, Any]:
         """The record of the translation (``docs/record.md``); what refuses a program keeps its figures."""
-        restart = restart_record(self.toolpath) if self.toolpath is not None else {}
+        restart: dict[str, Any] = {}
+        if self.toolpath is not None:
+            from gcode2krl.restart.rows import restart_record
+
+            restart = restart_record(self.toolpath)
         return record_of(
             "translate",
             self._figures() | restart,

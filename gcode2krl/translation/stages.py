@@ -8,8 +8,14 @@ from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.files.program_names import DIALECT_NAMES, program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.attempt import Attempt
-from gcode2krl.translation.checks import outputs_of, place_of, refuse_early, refuse_online
-from gcode2krl.translation.from_line import read_from_line, refuse_without_forces, restart_name
+from gcode2krl.translation.checks import (
+    outputs_of,
+    place_of,
+    refuse_early,
+    refuse_online,
+    refuse_without_forces,
+    restart_name,
+)
 from gcode2krl.translation.inputs import (
     STANDARD,
     StandardInput,
@@ -17,6 +23,7 @@ from gcode2krl.translation.inputs import (
     existing,
     files_of_job,
     read_cell_under_job,
+    read_from_line,
     require_part,
 )
 from gcode2krl.translation.order import Order

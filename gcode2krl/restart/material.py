@@ -1,4 +1,4 @@
-"""A program that begins at a later G-code line: the material as cut so far, and the way down into it.
+"""The material as cut before a restart, and the way down into it.
 
 The way: HOME, PTP to a point on the tool axis above the first position, at the highest safe height that is
 known; at rapid speed down the axis to just above the material; from there at feed to the start of the line's
@@ -16,6 +16,7 @@ from gcode2krl.chain import Plan, prepare
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError
 from gcode2krl.pipeline import plan_motion
+from gcode2krl.restart.rows import approached_row, begun_at, begun_row, row_before
 from gcode2krl.tables import Motion, Restart, Toolpath
 
 ABOVE_STOCK_MM = 10.0
@@ -58,18 +59,18 @@ def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | N
     Raises
     ------
     NotUnderstoodError
-        Where the line cannot be one to begin at, see `program.begun_row`.
+        Where the line cannot be one to begin at, see `begun_row`.
     RefusedError
         Where a tool used before is missing, or the start of the line lies in material.
     """
-    row = program.begun_row(toolpath, line)
+    row = begun_row(toolpath, line)
     before, issues = _before(toolpath, row, cell, tolerance_mm)
     first = _first_row(before, row, cell)
     if first != row:
         issues.append(_one_before(toolpath, row, first))
     begins = int(toolpath.source_line[first])
     restart = Restart(line=line, begins_line=begins, left=before.left)
-    begun = program.begun_at(toolpath, first, restart, _way(before, first, cell))
+    begun = begun_at(toolpath, first, restart, _way(before, first, cell))
     issues += _other_arm(before, begun, cell, tolerance_mm)
     return replace(begun, issues=(*begun.issues, *issues))
 
@@ -152,7 +153,7 @@ def _first_row(before: _Before, row: int, cell: Cell) -> int:
     depth_mm = _depth_mm(before, row, cell)
     if depth_mm <= _CONTACT_MM:
         return row
-    other = program.row_before(before.toolpath, row)
+    other = row_before(before.toolpath, row)
     if other is not None and _depth_mm(before, other, cell) <= _CONTACT_MM:
         return other
     toolpath = before.toolpath
@@ -170,7 +171,7 @@ def _first_row(before: _Before, row: int, cell: Cell) -> int:
 
 def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
     """Return how deep in material the tool stands at the start of a row; of a rapid 0, as its end counts."""
-    at = program.approached_row(before.toolpath, row)
+    at = approached_row(before.toolpath, row)
     if before.left is None or at == row:
         return 0.0
     tip_mm = before.to_field @ before.toolpath.position_mm[at]
@@ -200,12 +201,12 @@ def _one_before(toolpath: Toolpath, row: int, first: int) -> Issue:
 
 
 def _way(before: _Before, row: int, cell: Cell) -> Floats:
-    """Return the way (k, 3) from above to the first position of a row, see `program.begun_at`.
+    """Return the way (k, 3) from above to the first position of a row, see `begun_at`.
 
     Empty where that is not known, which the checks of any program refuse.
     """
     toolpath = before.toolpath
-    at = program.approached_row(toolpath, row)
+    at = approached_row(toolpath, row)
     is_feed = not toolpath.rapid[row]
     if is_feed and not toolpath.is_position()[row - 1]:
         return np.zeros((0, 3))
