@@ -24,8 +24,8 @@ import numpy as np
 
 from gcode2krl import plan_motion, predict, read_gcode, solve_joints
 from gcode2krl.cell import Cell, resolve_cell
+from gcode2krl.chain import prepare
 from gcode2krl.errors import Issue, NotUnderstoodError
-from gcode2krl.pipeline import targets_and_joints
 
 KINDS = {
     "box": 40,
@@ -302,7 +302,8 @@ def cell_of(**more: object) -> Cell:
 def tracks_of(part: Path, cell: Cell) -> list[Track]:
     """Return the rows of joints along all ways of a program, by line."""
     toolpath = read_gcode(part, cell)
-    targets, joints = targets_and_joints(toolpath, cell)
+    plan = prepare(toolpath, cell)
+    targets, joints = plan.targets, plan.joints
     motion = plan_motion(targets, cell, 0.008, watches=False)
     q_rad = solve_joints(motion, cell).q_rad
     line = toolpath.source_line[motion.move]

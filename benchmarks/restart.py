@@ -35,7 +35,7 @@ from gcode2krl.krl.read import KrlProgram, read_texts
 from gcode2krl.krl.release import NEVER_RELEASED
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.prediction import Prediction
-from gcode2krl.restart import restarted
+from gcode2krl.restart.material import restarted
 from gcode2krl.tables import Toolpath
 
 COLLISIONS = frozenset({"rapid-in-stock", "shank-in-stock", "holder-in-stock"})

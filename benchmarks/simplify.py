@@ -23,7 +23,8 @@ from gcode2krl.gcode import read_gcode, read_stream
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.original_path import compare_with_original
 from gcode2krl.krl.read import read_texts
-from gcode2krl.pipeline import set_targets, solve_ptp_joints
+from gcode2krl.pipeline import set_targets
+from gcode2krl.robot import ptp_joints
 from gcode2krl.tables import Targets, Toolpath
 
 LAWS = {
@@ -126,7 +127,8 @@ def _cost(moves: int, cell: Cell) -> None:
     fewer = timed("merging", lambda: program.merged(whole, toolpath, cell, 0.01))
     for name, targets in (("time before", whole), ("time after", fewer)):
         timed(name, lambda t=targets: krc4.plan(krc4.build_chain(t, cell), cell))
-    texts = compose(fewer, solve_ptp_joints(fewer, cell), cell, "RASTER", Layout())
+    files = compose(fewer, ptp_joints(fewer, cell), cell, "RASTER", Layout())
+    texts = {name: b"".join(pieces) for name, pieces in files.items()}
     read = read_texts(texts, "RASTER.src")
     timed("against the G-code", lambda: compare_with_original(read, fewer, toolpath, cell))
     timed("targets, simplified", lambda: set_targets(toolpath, cell, None, 0.01))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,8 @@ from gcode2krl import collision, compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.clearance import ArmInStock, Beside, Inside, moves_watched_at_targets, watch_of
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.files.spool import Spool, let_go
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
 from gcode2krl.tables import (
@@ -46,6 +44,12 @@ class Planned:
     """Raises `RefusedError` where the motion cannot be cut out of one field."""
     kept: "Kept | None"
 
+    def samples(self) -> "Kept":
+        """Return the samples of a motion that was planned to keep them."""
+        if self.kept is None:
+            raise AssertionError("samples that are asked for are kept")
+        return self.kept
+
 
 class Kept(NamedTuple):
     """The samples of a motion, where they were asked for."""
@@ -56,6 +60,12 @@ class Kept(NamedTuple):
     qd_rad_s: Floats | None
     clearance: Clearance | None
     """None where the cell describes nothing that may hit or be hit."""
+
+    def joints(self, cell: Cell) -> Joints:
+        """Return the joints at the samples, solved here where the planning did not need them."""
+        if self.q_rad is None or self.qd_rad_s is None:
+            return robot.follow_motion(self.motion, cell)
+        return robot.joints_from_angles(self.motion, self.q_rad, self.qd_rad_s, cell)
 
 
 def plan_course(
@@ -88,7 +98,10 @@ def plan_course(
         remedy = "lower F there, move the part, or turn the tool about its axis"
         issues.append(Issue("warning", "joint-speed", int(chain.source_line[worst]), sentence, remedy))
     issues += [*seen.acceleration.issues(), *seen.contacts]
-    return Planned(course, tuple(issues), seen.watch.outlook, seen.kept)
+    kept = seen.kept
+    if kept is not None:
+        kept = kept._replace(motion=replace(kept.motion, issues=tuple(issues)))
+    return Planned(course, tuple(issues), seen.watch.outlook, kept)
 
 
 class _Seen(NamedTuple):
@@ -243,7 +256,7 @@ class Loads:
         dt_s: float,
         *,
         has_peaks: bool = True,
-        ways: Callable[[], Sequence[Beside]] = tuple,
+        ways: Sequence[Beside] = (),
     ) -> None:
         """Set up the stock; raises `NotUnderstoodError` where it cannot be read.
 
@@ -267,7 +280,6 @@ class Loads:
         try:
             self._milling = cutting.Milling(toolpath, cell, outlook(), dt_s, has_peaks=has_peaks)
             self._arm = ArmInStock.of(toolpath, cell, self._milling, ways)
-            give_back()
         except RefusedError as error:
             self._skipped = tuple(replace(issue, severity="warning") for issue in error.issues)
 
@@ -311,7 +323,6 @@ class Loads:
 
     def _judged(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, forces: Forces) -> Block:
         line = self._toolpath.source_line[np.clip(motion.move, 0, len(self._toolpath) - 1)]
-        let_go(self._toolpath)
         self._force_limits.take(forces, line)
         self._cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
         deflection = None
@@ -336,7 +347,6 @@ class Loads:
         guessed = any(issue.code == "stock-guessed" for issue in found)
         feeds = program.feeds_per_tooth(self._toolpath, self._cell, self._cuts)
         force_issues = (*found, *limits.issues(guessed), *feeds)
-        let_go(self._toolpath)
         if self._missing is not None:
             return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
         if bent.absurd is not None:
@@ -347,33 +357,36 @@ class Loads:
 class PilotSamples:
     """What the pilot force of a program is made from, gathered from samples that have passed all stages."""
 
-    def __init__(self, cell: Cell) -> None:
-        """Begin without a sample."""
-        self._cell = cell
-        names = ("time_s", "path_mm", "speed_mm_s", "acceleration_mm_s2")
-        self._columns = {name: Spool(np.float64) for name in names}
-        self._columns |= {"line": Spool(np.int32), "force_N": Spool(np.float64, 3)}
-        self._bent = Spool(np.float64, 3)
+    def __init__(self, cell: Cell, count: int) -> None:
+        """Take how many samples will come."""
+        self._cell, self._gathered = cell, Gathered[PilotForce](count)
 
     def take(self, motion: Motion, line: Ints32, forces: Forces, deflection: Deflection | None) -> None:
         """Add the next samples."""
-        for name, spool in self._columns.items():
-            if name in ("line", "force_N"):
-                continue
-            spool.append(getattr(motion, name))
-        self._columns["line"].append(line)
-        self._columns["force_N"].append(self._turned(forces.force_base_N, motion))
+        force_N = self._turned(forces.force_base_N, motion)
+        bent_mm = np.broadcast_to(np.nan, force_N.shape)
         if deflection is not None:
-            self._bent.append(self._turned(deflection.deflection_base_mm, motion))
+            bent_mm = self._turned(deflection.deflection_base_mm, motion)
+        samples = PilotForce(
+            time_s=motion.time_s,
+            path_mm=motion.path_mm,
+            speed_mm_s=motion.speed_mm_s,
+            acceleration_mm_s2=motion.acceleration_mm_s2,
+            line=line,
+            force_N=force_N,
+            deflection_mm=bent_mm,
+        )
+        self._gathered.take(samples)
 
     def _turned(self, vectors: Floats, motion: Motion) -> Floats:
         return to_pilot_frame(vectors, motion.rotation, motion.tool, self._cell) if len(motion) else vectors
 
     def force(self, with_deflection: bool) -> PilotForce:
         """Return all samples; a deflection that is not known is NaN."""
-        columns: dict[str, Any] = {name: spool.column() for name, spool in self._columns.items()}
-        unknown = np.broadcast_to(np.nan, columns["force_N"].shape)
-        return PilotForce(**columns, deflection_mm=self._bent.column() if with_deflection else unknown)
+        force = self._gathered.table()
+        if with_deflection:
+            return force
+        return replace(force, deflection_mm=np.broadcast_to(np.nan, force.deflection_mm.shape))
 
 
 def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[Samples]:

@@ -35,7 +35,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Restart:
-    """Where a program begins that does not run from its start (`program.restart`)."""
+    """Where a program begins that does not run from its start (`restart.rows`)."""
 
     line: int
     """G-code line that was asked for."""
@@ -115,7 +115,7 @@ class Gathered(Generic[AnyTable]):
         if len(new) and new.strides[0] == 0:
             if known is None:
                 return np.broadcast_to(new[0], shape)
-            if known.strides[0] == 0 and np.array_equal(known[0], new[0]):
+            if known.strides[0] == 0 and np.array_equal(known[0], new[0], equal_nan=True):
                 return known
         if known is None:
             known = np.empty(shape, new.dtype)

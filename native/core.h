@@ -1,7 +1,7 @@
 /* What every file of the compiled core shares: views of arrays, and how an index is checked.
 
-The core is C99 without allocation and global state (but for memory/, which gives numpy its memory) and without
-fast-math: the same input gives the same bits on every processor. Arrays come from Python as views; `AT` and `CELL` read and write them, and a build
+The core is C99 without allocation, without global state and without fast-math: the same input gives the same
+bits on every processor. Arrays come from Python as views; `AT` and `CELL` read and write them, and a build
 with CHECKED stops the process at the first index outside its array, with the file and the line.
 A constant of the Python modules stands in constants.h under the name of its module and its own. */
 

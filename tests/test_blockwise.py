@@ -2,23 +2,26 @@
 
 import tracemalloc
 from contextlib import closing
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gcode2krl import load_cell, read_gcode, set_targets
+from gcode2krl import load_cell, read_gcode, robot, set_targets
 from gcode2krl.blockwise import Loads, follower_of, plan_course
+from gcode2krl.chain import Plan, collect, forecast_of, foresee, prepare
 from gcode2krl.cli.main import main
 from gcode2krl.compiled.threads import THREADS_VARIABLE
 from gcode2krl.krc4.course import Course
-from gcode2krl.pipeline import forecast_of, forecast_toolpath, plan_motion, predict_toolpath, solve_joints
+from gcode2krl.pipeline import plan_motion, predict_toolpath, solve_joints
 from gcode2krl.tables import joined, lengths, rows_of
+from tests.cells import over_demonstration
 
 REPOSITORY = Path(__file__).parents[1]
 GOLDEN = REPOSITORY / "tests" / "golden" / "programs"
+POST = {"name": "post", "frame": "base", "box_mm": [[300.0, 0.0, 0.0], [340.0, 40.0, 300.0]]}
 BYTES_A_LINE = 1500.0
 """Of Python's and numpy's memory, most that a line of G-code may add to the peak of a translation."""
 
@@ -74,9 +77,9 @@ def test_motion_joints_forces_and_deflection_in_blocks_are_those_as_a_whole(part
 
 
 def test_a_forecast_says_what_the_prediction_says(part):
-    toolpath, targets, cell = part
-    whole = forecast_of(predict_toolpath(toolpath, cell, targets=targets))
-    passed = forecast_toolpath(toolpath, cell, targets)
+    plan = Plan.of(*part)
+    whole = forecast_of(collect(plan))
+    passed = foresee(plan)
     assert passed.issues == whole.issues
     assert passed.loads == whole.loads
     assert (passed.time_s, passed.path_mm) == (whole.time_s, whole.path_mm)
@@ -84,16 +87,42 @@ def test_a_forecast_says_what_the_prediction_says(part):
 
 
 def test_any_number_of_threads_gives_the_same_forecast(part, monkeypatch):
-    toolpath, targets, cell = part
+    plan = Plan.of(*part)
     whole = Course.blocks
     monkeypatch.setattr(Course, "blocks", lambda course: whole(course, 50))
     passed = []
     for threads in "125":
         monkeypatch.setenv(THREADS_VARIABLE, threads)
-        passed.append(forecast_toolpath(toolpath, cell, targets))
+        passed.append(foresee(plan))
     for other in passed[1:]:
         assert (other.issues, other.loads) == (passed[0].issues, passed[0].loads)
         same(other.pilot, passed[0].pilot)
+
+
+def test_a_plan_is_told_once_and_keeps_what_its_stages_ask_for(part):
+    """Joints of a plan are those a program is written with; judged once more only the findings grow."""
+    toolpath, targets, cell = part
+    plan = prepare(toolpath, cell)
+    same(plan.targets, targets)
+    assert plan.targets.issues == targets.issues
+    ptp = np.flatnonzero(targets.ptp)
+    alone = robot.ptp_joints(targets, cell)
+    for name in ("q_rad", "status", "turn"):
+        assert np.array_equal(getattr(plan.joints, name)[ptp], getattr(alone, name)[ptp]), name
+    again = Plan.of(toolpath, replace(targets, issues=()), cell).judged()
+    assert set(again.targets.issues) <= set(targets.issues)
+    assert again.joints.issues == plan.joints.issues
+
+
+def test_clearances_are_those_of_the_motion_whatever_becomes_of_its_findings(part):
+    toolpath, targets, cell = part
+    near = over_demonstration({"obstacle": [POST]})
+    prediction = collect(Plan.of(toolpath, targets, near), forces=False)
+    kept = plan_course(targets, near, near.controller.cycle_s, keeps=True).samples()
+    same(kept.clearance, prediction.clearance)
+    same(kept.joints(near), prediction.joints)
+    assert len(prediction.clearance) == len(replace(prediction.motion, issues=()))
+    assert collect(Plan.of(toolpath, targets, cell), forces=False).clearance is None
 
 
 def test_rows_of_a_table_joined_are_the_table(part):
@@ -137,7 +166,7 @@ def raster(folder, lines):
 
 @pytest.mark.slow
 def test_the_memory_of_a_translation_grows_by_little_a_line(tmp_path):
-    few, many = 30_000, 75_000
+    few, many = 75_000, 150_000  # from here on the blocks are full, and only tables grow
     peaks = [peak_bytes(raster(tmp_path, lines), tmp_path) for lines in (2_000, few, many)]
     assert (tmp_path / "part.src").stat().st_size > 60 * many
     assert (peaks[2] - peaks[1]) / (many - few) < BYTES_A_LINE

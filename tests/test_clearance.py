@@ -7,6 +7,7 @@ import pytest
 
 from gcode2krl import plan_motion, predict, robot, set_targets, solve_joints, write_krl
 from gcode2krl.cell.checked_parts import collision_scope
+from gcode2krl.chain import prepare
 from gcode2krl.clearance import (
     collisions_beside,
     moves_watched_at_targets,
@@ -22,7 +23,6 @@ from gcode2krl.collision.surroundings import surroundings_of
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.release import released
-from gcode2krl.pipeline import targets_and_joints
 from tests.cells import over_demonstration
 
 PART = """G21 G90 G94
@@ -113,7 +113,8 @@ def test_near_says_between_which_lines(part):
 def test_the_ptp_from_home_and_to_home_are_ways_of_the_joints(part):
     """A beam half-way between HOME and the part is above everything that the cut goes through."""
     cell = cell_with()
-    targets, joints = targets_and_joints(read_gcode(part, cell), cell)
+    plan = prepare(read_gcode(part, cell), cell)
+    targets, joints = plan.targets, plan.joints
     home, above = joints.q_rad[0], joints.q_rad[1]
     assert targets.home[0]
     assert targets.ptp[1]
@@ -147,7 +148,7 @@ def test_a_point_on_the_way_is_proposed_and_is_free(part, monkeypatch):
     monkeypatch.setattr("gcode2krl.clearance.proposals._HIGHER_MM", ())
     home = {"q_deg": [60.0, -90, 90, 0, 60, 0]}
     cell = cell_with(home=home)
-    _, joints = targets_and_joints(read_gcode(part, cell), cell)
+    joints = prepare(read_gcode(part, cell), cell).joints
     from_home, above = joints.q_rad[0], joints.q_rad[1]
     middle = robot.forward((from_home + above)[None] / 2, cell)[0][0]
     cell = cell_with(box("post", (middle - 10).tolist(), (middle + 10).tolist()), home=home)
@@ -176,7 +177,8 @@ def test_a_way_to_home_within_the_program_is_one_of_the_joints(tmp_path):
     file = tmp_path / "part.nc"
     file.write_text(PART.replace("G0 X0 Y0\n", "G28 X0 Y0\nG0 X20 Y20 Z50\nG0 Z5\nG1 Z-1\nG0 Z50\n"))
     cell = cell_with(box("clamp", [15.0, 15, -5], [25, 25, 2]))
-    targets, joints = targets_and_joints(read_gcode(file, cell), cell)
+    plan = prepare(read_gcode(file, cell), cell)
+    targets, joints = plan.targets, plan.joints
     inside = np.flatnonzero(targets.home)[1]
     assert shown_otherwise(targets)[inside]
     moves = moves_watched_at_targets(targets)
@@ -315,7 +317,8 @@ def test_random_boxes_are_hit_by_what_a_dense_sampling_says_at_its_lines(part):
     base = cell_with()
     geometry = base.robot.geometry.array()
     toolpath = read_gcode(part, base)
-    targets, joints = targets_and_joints(toolpath, base)
+    plan = prepare(toolpath, base)
+    targets, joints = plan.targets, plan.joints
     motion = plan_motion(targets, base, 0.004)
     parts = parts_of(base, 1)
     bodies = capsules_of(parts, geometry)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from gcode2krl import predict, read_gcode, write_krl
+from gcode2krl.chain import prepare
 from gcode2krl.clearance import collisions_on_retracts, watch_of
 from gcode2krl.collision import Carried
 from gcode2krl.errors import RefusedError
 from gcode2krl.krl.rsi_text import rsi_rows
-from gcode2krl.pipeline import targets_and_joints
 from tests.cells import over_demonstration
 
 PART = """G21 G90 G17
@@ -41,7 +41,8 @@ def part(tmp_path):
 def beam(part):
     """A bar 40 mm above the arm where the tool is farthest from start and end of the cut."""
     cell = cell_with([], AWAY_MM)
-    targets, joints = targets_and_joints(read_gcode(part, cell), cell)
+    plan = prepare(read_gcode(part, cell), cell)
+    targets, joints = plan.targets, plan.joints
     row = int(np.argmin(targets.position_mm[:, 1]))
     carried = Carried(cell)
     ends = carried.ends_mm(joints.q_rad[row : row + 1])[0].reshape(-1, 2, 3)
@@ -72,7 +73,7 @@ def test_a_bar_above_the_arm_is_hit_on_the_retract_alone(part, tmp_path):
 
 def test_a_short_retract_does_not_reach_it(part):
     cell = cell_with([beam(part)], 20.0)
-    targets, _ = targets_and_joints(read_gcode(part, cell), cell)
+    targets = prepare(read_gcode(part, cell), cell).targets
     found = collisions_on_retracts(targets, *rsi_rows(targets), 20.0, cell)
     assert not [issue for issue in found if issue.code == "collision"]
     found = collisions_on_retracts(targets, *rsi_rows(targets), AWAY_MM, cell)
@@ -81,5 +82,5 @@ def test_a_short_retract_does_not_reach_it(part):
 
 def test_a_cell_that_describes_nothing_has_none(part):
     cell = over_demonstration({})
-    targets, _ = targets_and_joints(read_gcode(part, cell), cell)
+    targets = prepare(read_gcode(part, cell), cell).targets
     assert collisions_on_retracts(targets, *rsi_rows(targets), AWAY_MM, cell) == ()

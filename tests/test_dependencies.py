@@ -12,7 +12,7 @@ import gcode2krl
 from tests.conftest import ROOT
 
 PACKAGE = Path(gcode2krl.__file__).parent
-IMPORTED_AS = {"tomli-w": "tomli_w"}
+IMPORTED_AS = {"tomli-w": "tomli_w", "arro3-core": "arro3"}
 
 TRIANGLES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 POINTS = ((0, 0, 0), (30, 0, 0), (0, 30, 0), (0, 0, 30))

@@ -12,8 +12,8 @@ from gcode2krl.errors import RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.prediction import Prediction
-from gcode2krl.program.restart import begun_row
-from gcode2krl.restart import ABOVE_STOCK_MM, ENTRY_MM, restarted
+from gcode2krl.restart.material import ABOVE_STOCK_MM, ENTRY_MM, restarted
+from gcode2krl.restart.rows import begun_row
 from tests.cells import over_demonstration
 from tests.conftest import EXAMPLES
 

@@ -158,7 +158,7 @@ def test_the_day_is_said_and_not_written(tmp_path: Path, capfd, monkeypatch):
     assert _run(command) == 0
     assert "verified-future" in capfd.readouterr().err
     before = output.read_bytes(), output.with_suffix(".dat").read_bytes()
-    monkeypatch.setattr("gcode2krl.pipeline.future_confirmation", lambda cell: ())
+    monkeypatch.setattr("gcode2krl.chain.future_confirmation", lambda cell: ())
     assert _run(command) == 0
     assert "verified-future" not in capfd.readouterr().err
     assert (output.read_bytes(), output.with_suffix(".dat").read_bytes()) == before

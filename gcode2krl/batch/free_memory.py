@@ -8,7 +8,7 @@ from pathlib import Path
 
 BASE_MB = 200.0
 """A worker with everything imported and a short program, measured: see docs/batch.md."""
-PER_MB = 30.0
+PER_MB = 55.0
 """And for each MB of G-code, measured: see docs/batch.md."""
 WHOLE_TABLES_PER_MB = 120.0
 """The same where a page or a compensation needs whole tables, measured: see docs/batch.md."""

@@ -15,8 +15,9 @@ from gcode2krl.canned.draft import Draft
 from gcode2krl.canned.place import Place
 from gcode2krl.canned.turning import Pose, Turn
 from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, collect, prepare
 from gcode2krl.errors import input_error
-from gcode2krl.pipeline import checked, plan_motion, predict_toolpath, targets_and_joints
+from gcode2krl.pipeline import plan_motion
 from gcode2krl.prediction import Prediction
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import S_PER_MIN
@@ -72,23 +73,25 @@ def toolpath_of(draft: Draft, cell: Cell) -> Toolpath:
 def targets_of(draft: Draft, cell: Cell) -> Targets:
     """Return the targets of the KRL form, with the findings of the cell and the robot.
 
-    Raises what `pipeline.targets_and_joints` raises.
+    Raises what `pipeline.set_targets` raises.
     """
-    return _targets(draft, toolpath_of(draft, cell), cell)
+    return _plan(draft, cell).targets
 
 
-def _targets(draft: Draft, toolpath: Toolpath, cell: Cell) -> Targets:
-    targets, joints = targets_and_joints(toolpath, cell)
+def _plan(draft: Draft, cell: Cell) -> Plan:
+    plan = prepare(toolpath_of(draft, cell), cell)
     if not draft.turns:
-        return targets
+        return plan
+    targets, joints = plan.targets, plan.joints
     programmed = np.flatnonzero(targets.move >= 0)
     lines = targets.source_line[programmed]
     for line, turning in reversed(draft.turns):
         row = int(programmed[lines <= line][-1])  # a line that leads nowhere has no row of its own
         turn = turning(_pose(targets, joints, row), draft.place, cell)
         targets = _inserted(targets, row, turn)
-    turned = checked(targets, cell)[0]
-    return replace(turned, issues=tuple(dict.fromkeys(turned.issues)))
+    turned = Plan.of(plan.toolpath, targets, cell).judged()
+    once = tuple(dict.fromkeys(turned.targets.issues))
+    return replace(turned, targets=replace(turned.targets, issues=once))
 
 
 def _pose(targets: Targets, joints: Joints, row: int) -> Pose:
@@ -120,8 +123,7 @@ def _inserted(targets: Targets, row: int, turn: Turn) -> Targets:
 
 def predicted(draft: Draft, cell: Cell, dt_s: float = COARSE_S) -> Prediction:
     """Return the prediction of the KRL form, in air."""
-    toolpath = toolpath_of(draft, cell)
-    return predict_toolpath(toolpath, cell, dt_s=dt_s, targets=_targets(draft, toolpath, cell), forces=False)
+    return collect(_plan(draft, cell), dt_s, forces=False)
 
 
 def minutes_of(draft: Draft, targets: Targets, cell: Cell) -> float:

@@ -7,7 +7,7 @@ the field lags behind the cutter. The ways that a Motion does not show are held 
 samples behind them begin, with holder and cutter, which no removal judges there.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -92,13 +92,13 @@ class ArmInStock:
         toolpath: Toolpath,
         cell: Cell,
         milling: cutting.Milling,
-        ways: Callable[[], Sequence[Beside]] = tuple,
+        ways: Sequence[Beside] = (),
     ) -> "ArmInStock | None":
         """Return what watches them, None where the cell is not checked for collisions or states neither."""
         stated = bool(cell.robot.body.capsules) or cell.spindle.body is not None
         if not (stated and checks_collisions(cell) and cell.robot.geometry.known):
             return None
-        return cls(toolpath, cell, milling, ways())
+        return cls(toolpath, cell, milling, ways)
 
     def divided(self, samples: Samples) -> Iterator[tuple[Samples, Inside | None]]:
         """Yield samples in stretches that are cut one after the other, each with its rows within the box.

@@ -208,7 +208,7 @@ def _write_krl(
     from gcode2krl.krl import write_krl
 
     written = write_krl(test.targets(), file, cell, options=test.option, inputs=inputs)
-    lines = sum(piece.count(b"\n") for text in written.contents.values() for piece in text.pieces())
+    lines = sum(text.count(b"\n") for text in written.texts.values())
     return list(written.files), lines, written.issues
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from gcode2krl.errors import input_error
-from gcode2krl.translation.from_line import restart_record
 
 if TYPE_CHECKING:
     from gcode2krl.tables import Toolpath
@@ -43,6 +42,8 @@ def restart_words(toolpath: "Toolpath") -> list[str]:
     """Return the lines of the summary about a restart."""
     if toolpath.restart is None:
         return []
+    from gcode2krl.restart.rows import restart_record
+
     record = restart_record(toolpath)["restart"]
     line = f"from line {toolpath.restart.line}, begins with the move of line {record['begins_line']}"
     way = record["way_mm"]

@@ -6,19 +6,19 @@ import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import collision_scope
+from gcode2krl.chain import Plan
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.krl.external_words import axes_words
 from gcode2krl.prediction.forecast import Forecast
-from gcode2krl.tables import Joints
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
 def summary_lines(
-    part: str, forecast: Forecast, joints: Joints, corner_mm: float, written: WrittenProgram
+    part: str, plan: Plan, forecast: Forecast, corner_mm: float, written: WrittenProgram
 ) -> Iterator[str]:
-    """Yield the lines of the summary, from joints at the targets and the largest corner error."""
-    toolpath, targets, cell = forecast.toolpath, forecast.targets, forecast.cell
+    """Yield the lines of the summary; ``corner_mm`` is the largest corner error."""
+    toolpath, targets, joints, cell = plan.toolpath, plan.targets, plan.joints, plan.cell
     size_mb = written.size_bytes / BYTES_PER_MB
     report = written.report
     lin = ~targets.ptp

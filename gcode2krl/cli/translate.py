@@ -87,9 +87,6 @@ def command(as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """
     order = Order(**options)
     console = Console(quiet or order.output == STANDARD, as_json)
-    from gcode2krl.compiled.long_columns import long_columns_on_disk
-
-    click.get_current_context().with_resource(long_columns_on_disk())  # the summary looks at columns too
     attempt = _attempt(order, console)
     if attempt.page is not None:
         console.hint(f"{attempt.page} written: open it in a browser")
@@ -115,25 +112,19 @@ def _attempt(order: Order, console: Console) -> Attempt:
 def _tell(attempt: Attempt, console: Console) -> None:
     """Print the findings of a written program, and its text or its summary."""
     order, written = attempt.order, attempt.written
-    toolpath, forecast, joints, corner_mm = (
-        attempt.toolpath,
-        attempt.forecast,
-        attempt.joints,
-        attempt.corner_mm,
-    )
-    if written is None or toolpath is None or forecast is None or joints is None or corner_mm is None:
+    plan, forecast, corner_mm = attempt.plan, attempt.forecast, attempt.corner_mm
+    if written is None or plan is None or forecast is None or corner_mm is None:
         raise AssertionError("a written program has run every stage")
     if order.output == STANDARD:
-        for piece in written.contents[f"{written.name}.src"].pieces():
-            write_bytes(piece)
+        write_bytes(written.texts[f"{written.name}.src"])
         console.findings(written.issues, str(order.part))
         return
     console.findings(written.issues, str(order.part))
     from gcode2krl.cli.summary import summary_lines
 
     lines = [
-        *summary_lines(str(order.part), forecast, joints, corner_mm, written),
-        *restart_words(toolpath),
+        *summary_lines(str(order.part), plan, forecast, corner_mm, written),
+        *restart_words(plan.toolpath),
         *(_online_lines(written) if order.online is not None else ()),
     ]
     for line in lines:

@@ -17,7 +17,7 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.translation.from_line import read_from_line, restart_record
+from gcode2krl.translation.inputs import read_from_line
 
 
 @click.command(
@@ -69,10 +69,8 @@ def command(
     """
     console = Console(quiet, as_json)
     try:
-        from gcode2krl.compiled.long_columns import long_columns_on_disk
         from gcode2krl.krl import verify_krl
 
-        click.get_current_context().with_resource(long_columns_on_disk())
         console.heading.reads(program, part)
         refuse_other_start(program, from_line)
         cell, of_job = read_cell_under_job(cell_path, job_path)
@@ -91,12 +89,11 @@ def command(
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
         prediction = None
         if compensate == "offline":
-            from gcode2krl.pipeline import judged_targets, predict_toolpath
+            from gcode2krl.chain import collect, prepare
             from gcode2krl.translation.compensation import compensated
 
-            targets, _, _ = judged_targets(toolpath, cell, tolerance_mm, simplify_mm)
-            whole = predict_toolpath(toolpath, cell, targets=targets)
-            prediction = compensated(whole, None)
+            plan, _ = prepare(toolpath, cell, tolerance_mm, simplify_mm).with_corners(tolerance_mm)
+            prediction = compensated(collect(plan), None)
         report = verify_krl(
             program,
             toolpath,
@@ -112,6 +109,8 @@ def command(
             raise
         return console.record({"verify": {"max_deviation_mm": None}}, error.issues, exit_code=error.exit_code)
     if as_json:
+        from gcode2krl.restart.rows import restart_record
+
         figures = {"verify": report.as_dict(), **restart_record(toolpath)}
         console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:

@@ -17,10 +17,11 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints32, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import external_starts, motion_starts
+from gcode2krl.chain import Plan
 from gcode2krl.compensation.correction import SETTLED_MM, Contact, Shift, interpolated, wanted_correction
 from gcode2krl.compensation.intended_path import Deviation, Evaluated, Placed, Ways, deviation_from
 from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.pipeline import checked, plan_motion
+from gcode2krl.pipeline import plan_motion
 from gcode2krl.tables import Deflection, Forces, Motion, Targets, Toolpath
 
 Evaluate = Callable[[Targets], Evaluated]
@@ -97,7 +98,7 @@ def compensate(
     issues = (
         *_settled(change_mm, tolerance_mm, targets.source),
         *_remaining(now, tolerance_mm),
-        *_new_findings(moved, targets, cell),
+        *_new_findings(toolpath, moved, targets, cell),
     )
     figures = {
         "rounds": float(rounds),
@@ -264,8 +265,8 @@ def _remaining(after: Deviation, tolerance_mm: float) -> Iterator[Issue]:
     )
 
 
-def _new_findings(moved: Targets, targets: Targets, cell: Cell) -> Iterator[Issue]:
+def _new_findings(toolpath: Toolpath, moved: Targets, targets: Targets, cell: Cell) -> Iterator[Issue]:
     """Yield the findings of the robot stage that only the moved targets have."""
-    judged, _ = checked(replace(moved, issues=()), cell)
+    judged = Plan.of(toolpath, replace(moved, issues=()), cell).judged()
     known = {(issue.code, issue.line) for issue in targets.issues}
-    yield from (issue for issue in judged.issues if (issue.code, issue.line) not in known)
+    yield from (issue for issue in judged.targets.issues if (issue.code, issue.line) not in known)

@@ -8,7 +8,6 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.cutting.engagement import NODES_PER_DIAMETER, Engaged, Engagement
 from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.force import peak_force
@@ -23,7 +22,6 @@ from gcode2krl.cutting.tool_use import Uses
 from gcode2krl.cutting.turns import shaped
 from gcode2krl.cutting.way import Points
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.files.spool import let_go
 from gcode2krl.tables import BLOCK_ROWS, Forces, Gathered, Motion, Toolpath, blocks_of, lengths
 
 _ARC_COLUMNS = 6
@@ -195,8 +193,6 @@ class Milling:
         self._teeth = np.array([one.teeth for one in self._tools])
         self._flutes_mm = np.array([one.flute_length_mm or np.inf for one in self._tools])
         field = height_field_of(toolpath, cell, outlook.to_field, self._tools)
-        let_go(toolpath)
-        give_back()
         self._before = _uncut(field)
         shanks = [_with_shank(one) for one in self._tools]
         places_mm = outlook.places_mm

@@ -221,15 +221,6 @@ def written_meanwhile(place: Path) -> NotUnderstoodError:
     )
 
 
-@contextlib.contextmanager
-def naming_temporary_folder() -> Iterator[None]:
-    """Raise `NotUnderstoodError` that names the temporary folder where the disk refuses a file in it."""
-    try:
-        yield
-    except OSError as error:
-        raise unwritable(Path(tempfile.gettempdir()), error.strerror or str(error)) from None
-
-
 # --- leftovers of killed runs -----------------------------------------------------------------------------
 
 

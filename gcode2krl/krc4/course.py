@@ -7,12 +7,11 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.long_columns import by_regions
 from gcode2krl.errors import input_error
 from gcode2krl.krc4.motion import Chain, one_orientation
 from gcode2krl.krc4.profile import Profile
 from gcode2krl.krc4.sampling import Sampler, Samples, count_samples
-from gcode2krl.tables import BLOCK_ROWS, Gathered, Motion, Targets, joined
+from gcode2krl.tables import BLOCK_ROWS, Gathered, Motion, Targets
 from gcode2krl.units import S_PER_H
 
 _MOST_SAMPLES = 50_000_000
@@ -54,14 +53,7 @@ class Course:
 
     def at(self, rows: Ints) -> Motion:
         """Return rising rows of the Motion."""
-        first_move = 0
-
-        def sampled(part: Ints) -> Motion:
-            nonlocal first_move
-            motion, first_move = self._sampled(part, first_move)
-            return motion
-
-        return joined(*by_regions(rows, sampled))
+        return self._sampled(rows, first_move=0)[0]
 
     def whole(self) -> Motion:
         """Return the Motion."""

@@ -10,9 +10,7 @@ import numpy as np
 from gcode2krl import krc4
 from gcode2krl.arrays import Floats, Rows
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.memory import give_back
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.files.spool import let_go
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import most_active, view
 from gcode2krl.krl.cuts import cut_for
@@ -23,8 +21,6 @@ from gcode2krl.krl.triggers import Triggers, place_triggers
 from gcode2krl.krl.windows import Windows, windows_of
 from gcode2krl.pilot import Knots, PilotHeader, knots_of
 from gcode2krl.pilot.knots import LEAD_DECIMALS
-from gcode2krl.pipeline import forecast_of
-from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints, PilotForce, Targets
 from gcode2krl.units import RAD_PER_DEG
@@ -55,12 +51,12 @@ class PilotPlan:
     issues: tuple[Issue, ...]
 
 
-def pilot_force(source: Prediction | Forecast) -> PilotForce:
+def pilot_force(source: Forecast) -> PilotForce:
     """Return the samples that a pilot force is made from.
 
-    Raises `NotUnderstoodError` for a prediction without forces.
+    Raises `NotUnderstoodError` for a forecast without forces.
     """
-    force = (source if isinstance(source, Forecast) else forecast_of(source)).pilot
+    force = source.pilot
     if force is None:
         sentence = "the prediction has no forces to pilot with"
         raise input_error("option-value", sentence, "predict with a material and stock, or --pilot none")
@@ -78,18 +74,16 @@ class Layout(NamedTuple):
 class Planner:
     """A program and its predicted forces; announces sets of knots in it."""
 
-    def __init__(self, source: Prediction | Forecast, joints: Joints, form: Form, sidecar: bool) -> None:
+    def __init__(self, source: Forecast, joints: Joints, form: Form, sidecar: bool) -> None:
         self.targets, self.joints, self.cell = source.targets, joints, source.cell
         self.form, self.sidecar = form, sidecar
         self.motion = pilot_force(source)
         self.chain = krc4.build_chain(self.targets, self.cell)
         self.windows = windows_of(self.targets, self.chain, self.motion, self.cell)
-        let_go(self.motion)
-        give_back()
 
     def knots(self, tolerance_N: float | None) -> Knots:
         """Return the knots of a tolerance."""
-        knots = knots_of(
+        return knots_of(
             self.motion.time_s,
             self.motion.path_mm,
             self.motion.force_N,
@@ -99,8 +93,6 @@ class Planner:
             tolerance_N=tolerance_N,
             cycle_s=self.cell.controller.cycle_s,
         )
-        let_go(self.motion)
-        return knots
 
     @cached_property
     def whole(self) -> Layout:

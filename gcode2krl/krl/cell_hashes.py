@@ -71,12 +71,7 @@ class StatedCell:
 
     def __init__(self, program: KrlProgram) -> None:
         """Read the fold at the beginning of the main file."""
-        head = b""
-        for piece in program.contents[program.file[0]].pieces():
-            head += piece
-            if _END in head or len(head) > _LONGEST:
-                break
-        head = head.partition(_END)[0]
+        head = program.texts[program.file[0]][:_LONGEST].partition(_END)[0]
         self.line = 0
         self.hashes: dict[str, str] = {}
         self.is_malformed = False

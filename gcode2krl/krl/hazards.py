@@ -3,19 +3,16 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, foresee
 from gcode2krl.errors import Issue
 from gcode2krl.krl.release import is_refusing, released_again
 from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
-from gcode2krl.pipeline import forecast_toolpath
 from gcode2krl.prediction import Prediction
-from gcode2krl.tables import Targets, Toolpath
 
 
 def judged(
-    source: Targets | Prediction,
-    toolpath: Toolpath,
-    cell: Cell,
+    plan: Plan,
+    prediction: Prediction | None,
     releases: Mapping[str, int | None],
     *,
     online: bool,
@@ -27,14 +24,14 @@ def judged(
     ``releases`` are those in the header of the program and how many findings each was for, None for any.
     ``forces`` cuts material too.
     """
-    targets = source if isinstance(source, Targets) else source.targets
-    known = [*source.issues]
+    targets, cell = plan.targets, plan.cell
+    known = [*targets.issues] if prediction is None else [*prediction.issues]
     if online:
         known = [*online_issues(targets, cell), *retract_issues(targets, cell), *known]
-    if isinstance(source, Targets) and not is_refusing(known, releases):  # else nothing can be foreseen
-        forecast = forecast_toolpath(toolpath, cell, targets, forces=forces)
+    if prediction is None and not is_refusing(known, releases):  # else nothing can be foreseen
+        forecast = foresee(plan, forces=forces)
         known += forecast.issues[len(targets.issues) :]
-    return list(_of_gcode(released_again(known, releases), toolpath.source))
+    return list(_of_gcode(released_again(known, releases), plan.toolpath.source))
 
 
 def _of_gcode(issues: Iterable[Issue], source: str) -> Iterator[Issue]:

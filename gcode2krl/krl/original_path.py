@@ -67,7 +67,7 @@ def require_stated(program: KrlProgram, simplify_mm: float | None) -> None:
     The tolerance is never taken from the program that is to be judged by it.
     """
     main = program.file[0]
-    found = _STATED.search(next(program.contents[main].pieces(), b"")[:_HEAD_BYTES])
+    found = _STATED.search(program.texts[main][:_HEAD_BYTES])
     stated = found[1].decode("ascii", "replace") if found else None
     if stated == (f"{simplify_mm:g}" if simplify_mm is not None else None):
         return

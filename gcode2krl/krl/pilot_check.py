@@ -12,7 +12,6 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunked
 from gcode2krl.errors import MOST_PLACES, Issue
-from gcode2krl.files.spool import let_go
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
 from gcode2krl.krl.pilot_text import NO_KNOT_YET, PilotText, checksum
 from gcode2krl.krl.read import KrlProgram
@@ -69,7 +68,6 @@ def check_pilot(
     pilot, knots = case.text, case.text.knots
     ends = _ends_early(program, pilot)
     error_N, rms_N = _errors_of(knots, case.motion, case.force_N, ends)
-    let_go(case.motion)
     issues = [*_checksum_issues(program, pilot), *_form_issues(program, pilot)]
     lead_s: float | None = None
     windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
@@ -164,7 +162,6 @@ def _errors_of(
     def squares(rows: slice) -> Floats:
         off = force_N[rows] - force_at(knots, time_s[rows])
         acting[rows] = in_contact(force_N[rows])
-        let_go(motion)
         return np.asarray(np.einsum("ij,ij->i", off, off))
 
     square = chunked(squares, len(time_s))

@@ -5,7 +5,6 @@ from dataclasses import fields, replace
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl.announce import Form, Layout, PilotPlan, Planner
 from gcode2krl.pilot import Knots
-from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints
 
@@ -17,9 +16,9 @@ _TRIALS = 8
 
 
 def plan_pilot(
-    source: Prediction | Forecast, joints: Joints, form: Form, sidecar: bool = True, *, asked: bool = True
+    source: Forecast, joints: Joints, form: Form, sidecar: bool = True, *, asked: bool = True
 ) -> PilotPlan | Issue:
-    """Return the pilot of a prediction with forces, and the targets and joints with the motions it needs.
+    """Return the pilot of a forecast with forces, and the targets and joints with the motions it needs.
 
     Where the knots of the default tolerance cannot be announced in time, the tolerance is raised, with a
     finding. Where that does not help either, or the tolerance is stated in the cell, a pilot that was asked

@@ -1,7 +1,7 @@
 """The files of a program: what they are called, and how they come into their places together."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from gcode2krl import krl_words as w
@@ -9,15 +9,10 @@ from gcode2krl.cell.sections.robot import RsiVersion
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files import Staging, refuse_inputs
 from gcode2krl.files.program_names import program_stem
-from gcode2krl.files.stored import Stored, store
 from gcode2krl.krl.names import name_problem, suggested_name
 from gcode2krl.krl.rsi_files import file_names
 
 _ALIKE = "; a controller needs file and DEF alike"
-
-
-class GivenUpError(Exception):
-    """Nobody waits for the program any more."""
 
 
 class ProgramFiles:
@@ -26,8 +21,7 @@ class ProgramFiles:
     def __init__(self, file: Path | None, name: str, inputs: Sequence[str | Path]) -> None:
         self.file, self.name, self.inputs = file, name, inputs
         self.staging = Staging()
-        self.contents: dict[str, Stored] = {}
-        self._is_given_up = False
+        self.texts: dict[str, bytes] = {}
 
     def __enter__(self) -> "ProgramFiles":
         return self
@@ -36,36 +30,27 @@ class ProgramFiles:
         self.staging.discard()
 
     def write(self, texts: Mapping[str, Iterable[bytes]]) -> None:
-        """Write the program piece by piece, in the place of what has been written before."""
+        """Write the program piece by piece, in the place of what has been written before.
+
+        ``texts`` then holds what the files say: it is read from them.
+        """
         self.staging.discard()
-        self.contents.clear()
+        self.texts.clear()
         if self.file is not None:
             refuse_inputs([_place(self.file, part, self.name) for part in texts], self.inputs)
         for part, pieces in texts.items():
             if self.file is None:
-                self.contents[part] = store(self._wanted(pieces))
+                self.texts[part] = b"".join(pieces)
             else:
                 place = _place(self.file, part, self.name)
-                self.contents[part] = Stored(self.staging.write(place, self._wanted(pieces)))
-
-    def give_up(self) -> None:
-        """Let a thread that writes end before its next piece, by a `GivenUpError` there."""
-        self._is_given_up = True
-
-    def _wanted(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
-        for piece in pieces:
-            if self._is_given_up:
-                raise GivenUpError
-            yield piece
+                self.texts[part] = self.staging.write(place, pieces).read_bytes()
 
     def take_places(self) -> list[Path]:
         """Put the files in their places and return these; none where there is no file."""
         if self.file is None:
             return []
         self.staging.take_places()
-        places = {part: _place(self.file, part, self.name) for part in self.contents}
-        self.contents = {part: Stored(place) for part, place in places.items()}
-        return list(places.values())
+        return [_place(self.file, part, self.name) for part in self.texts]
 
 
 def output_files(file: Path, online: str | None, rsi: RsiVersion = "3") -> list[Path]:

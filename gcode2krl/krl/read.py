@@ -1,8 +1,7 @@
 """KRL in: reads the subset that is written, in the order in which the controller would execute it."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +14,6 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
-from gcode2krl.files.stored import Stored, Texts, store, whole_lines
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.controller_state import may_disturb
@@ -96,13 +94,8 @@ class KrlProgram:
     guard: bool = True
     def_line: int = 0
     """Line of the main DEF."""
-    contents: Mapping[str, Stored] = field(default_factory=dict)
+    texts: Mapping[str, bytes] = field(default_factory=dict)
     """File name → what it says."""
-
-    @property
-    def texts(self) -> Mapping[str, bytes]:
-        """File name → bytes, those of long files read where they are asked for."""
-        return Texts(self.contents)
 
     @property
     def position_mm(self) -> Floats:
@@ -135,49 +128,38 @@ def read_krl(path: str | Path) -> KrlProgram:
     main = Path(path)
     texts = {main.name: _text_in(main)}
     beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
-    for name in _externals(texts[main.name].pieces()):
+    for name in _externals(texts[main.name]):
         file = beside.get(name.upper())
         if file is not None and file.name not in texts:
             texts[file.name] = _text_in(file)
     return read_texts(texts, main.name)
 
 
-def _text_in(file: Path) -> Stored:
+def _text_in(file: Path) -> bytes:
     try:
-        with file.open("rb"):
-            text = Stored(file)
-        return Stored(text.read()) if text.is_short else text
+        return file.read_bytes()
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
 
 
-def _externals(pieces: Iterable[bytes]) -> Iterator[str]:
+def _externals(text: bytes) -> Iterator[str]:
     """Yield the names that a program declares by EXT, at the beginning of a line."""
-    for text in whole_lines(pieces):
-        upper = text.upper()
-        at = upper.find(_EXT)
-        while at >= 0:
-            found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
-            if found:
-                yield found[1].decode("ascii")
-            line_end = upper.find(b"\n", at)
-            at = upper.find(_EXT, line_end) if line_end >= 0 else -1
+    upper = text.upper()
+    at = upper.find(_EXT)
+    while at >= 0:
+        found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
+        if found:
+            yield found[1].decode("ascii")
+        line_end = upper.find(b"\n", at)
+        at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
 
-def read_texts(texts: Mapping[str, bytes | Stored | Iterable[bytes]], main: str) -> KrlProgram:
-    """Read a program from file name → text, or pieces of it; ``main`` names the main file."""
+def read_texts(texts: Mapping[str, bytes], main: str) -> KrlProgram:
+    """Read a program from file name → text; ``main`` names the main file."""
     sources = [name for name in texts if name.lower().endswith(w.SOURCE_SUFFIX)]
     sources.sort(key=lambda name: name != main)
-    contents = {name: _as_stored(texts[name]) for name in sources}
-    with ExitStack() as stack:
-        opened = {name: stack.enter_context(text.opened()) for name, text in contents.items()}
-        return replace(_Reader(opened, main).read(), contents=contents)
-
-
-def _as_stored(text: bytes | Stored | Iterable[bytes]) -> Stored:
-    if isinstance(text, Stored):
-        return text
-    return Stored(text) if isinstance(text, bytes) else store(text)
+    read = _Reader({name: np.frombuffer(texts[name], dtype=np.uint8) for name in sources}, main).read()
+    return replace(read, texts={name: texts[name] for name in sources})
 
 
 class _Reader:

@@ -32,7 +32,7 @@ def declares_itself(program: KrlProgram) -> bool:
 
 def missing_parts(program: KrlProgram, externals: Iterable[str]) -> list[Issue]:
     """Return a finding for each part of a split program whose file is missing."""
-    there = {Path(name).stem.casefold() for name in program.contents}
+    there = {Path(name).stem.casefold() for name in program.texts}
     there |= {external.split("(")[0].strip().casefold() for external in externals}
     named = ((_PART.match(statement.text), statement.line) for statement in program.declarations)
     return [

@@ -11,11 +11,11 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, forecast_of, prepare
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import block, text_table
-from gcode2krl.files.stored import Texts, store
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.cell_hashes import StatedCell
@@ -32,7 +32,7 @@ from gcode2krl.krl.rules import in_file, rule_issues, state_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
 from gcode2krl.krl.splines import at_rest_behind, passing
 from gcode2krl.pilot import knot_rows, read_pilot
-from gcode2krl.pipeline import judged_targets, plan_motion, solve_ptp_joints
+from gcode2krl.pipeline import plan_motion
 from gcode2krl.prediction import Prediction
 from gcode2krl.program.arcs import arcs_of
 from gcode2krl.program.splines import splines_of
@@ -141,28 +141,26 @@ def verify_krl(
     require_stated(program, simplify_mm)
     stated = StatedCell(program)
     try:
-        targets = (
-            prediction.targets
-            if prediction is not None
-            else judged_targets(toolpath, cell, tolerance_mm, simplify_mm)[0]
-        )
+        if prediction is not None:
+            plan = Plan.of(toolpath, prediction.targets, cell)
+        else:
+            plan, _ = prepare(toolpath, cell, tolerance_mm, simplify_mm).with_corners(tolerance_mm)
     except RefusedError as refused:
         raise RefusedError([*refused.issues, *stated.changes(cell)], refused.source) from None
+    targets, joints = plan.targets, plan.joints
     parts = missing_parts(program, cell.program.externals)
     if parts:  # nothing behind them could be told from a difference
         return _not_whole(program, targets, parts)
-    joints = solve_ptp_joints(targets, cell)
     online = rsi_name(program, Path(path).parent)
     issues = [*stated.changes(cell, distinct(targets.tool).tolist())]
     releases = {**stated.releases(), **dict.fromkeys(allow)}
-    source = prediction if prediction is not None else targets
-    hazards = judged(source, toolpath, cell, releases, online=bool(online), forces=forces)
+    hazards = judged(plan, prediction, releases, online=bool(online), forces=forces)
     issues += hazards
     pilot, announced = _pilot_of(program, Path(path), cell)
     case: PilotCase | None = None
     if pilot is not None:
         if prediction is not None:
-            force = pilot_force(prediction)
+            force = pilot_force(forecast_of(prediction))
             case = PilotCase(pilot, force, force.force_N)
         else:
             case = PilotCase(pilot, plan_motion(targets, cell, cell.controller.cycle_s, watches=False))
@@ -179,11 +177,11 @@ def verify_krl(
     splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
     layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
-    expected = {name: store(pieces) for name, pieces in composed.items()}
+    expected = {name: b"".join(pieces) for name, pieces in composed.items()}
     if not alone:
-        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"].read())
+        issues += data_issues(Path(path), program, expected[f"{program.name}{w.DATA_SUFFIX}"])
     if online:
-        issues += rsi_file_issues(Path(path), Texts(expected))
+        issues += rsi_file_issues(Path(path), expected)
     intended = read_texts(expected, f"{program.name}{w.SOURCE_SUFFIX}")
     return compare(program, targets, joints, cell, intended, issues, case, toolpath)
 

@@ -1,6 +1,6 @@
 """``write_krl``: Targets to files, checked, read back and verified before anything is written."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -8,25 +8,25 @@ from typing import Literal
 import numpy as np
 
 from gcode2krl import krl_words as w
+from gcode2krl import robot
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import CollisionScope, collision_scope
-from gcode2krl.compiled.memory import give_back
+from gcode2krl.chain import forecast_of
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
-from gcode2krl.files.stored import Stored, Texts
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.composition import Layout
-from gcode2krl.krl.draft import Composer, Content
-from gcode2krl.krl.pilot_check import PilotFigures
+from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
+from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.places import ProgramFiles, program_file, require_name
+from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import header_words, released
 from gcode2krl.krl.rsi_files import refuse_file_name
 from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
-from gcode2krl.krl.verify import VerifyReport
+from gcode2krl.krl.verify import VerifyReport, compare
 from gcode2krl.krl.versions import version_issues
-from gcode2krl.pipeline import solve_ptp_joints
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.program.arcs import Arc, arcs_of
@@ -45,22 +45,17 @@ class WrittenProgram:
 
     name: str
     files: tuple[Path, ...]
-    contents: Mapping[str, Stored]
-    """File name → what it says: `Stored.pieces` yields it without holding the whole."""
+    texts: Mapping[str, bytes]
+    """File name → what it says."""
     report: VerifyReport
     issues: tuple[Issue, ...]
     targets: Targets
     """As written: with the pieces that the pilot force needs."""
 
     @property
-    def texts(self) -> Mapping[str, bytes]:
-        """File name → bytes, read from the files where they are asked for."""
-        return Texts(self.contents)
-
-    @property
     def size_bytes(self) -> int:
         """Bytes of all files."""
-        return sum(text.size_bytes for text in self.contents.values())
+        return sum(map(len, self.texts.values()))
 
     @property
     def pilot(self) -> PilotFigures | None:
@@ -79,10 +74,7 @@ class WrittenProgram:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the files, the read-back, the findings and the path from above."""
-        rows = [
-            ("file", f"{name}, {text.size_bytes / BYTES_PER_MB:.3f} MB")
-            for name, text in self.contents.items()
-        ]
+        rows = [("file", f"{name}, {len(text) / BYTES_PER_MB:.3f} MB") for name, text in self.texts.items()]
         rows.append(("read back", self.report.words()))
         if self.pilot is not None:
             rows.append(("pilot", f"{self.pilot.knots} knots"))
@@ -107,7 +99,6 @@ def write_krl(
     online: str | None = None,
     inputs: Sequence[str | Path] = (),
     toolpath: Toolpath | None = None,
-    complete: Callable[[], Forecast] | None = None,
 ) -> WrittenProgram:
     """Write a KRL program: ``.src``, ``.dat`` (parts, ``.pilot.csv``, RSI), all together or not at all.
 
@@ -133,8 +124,6 @@ def write_krl(
         are written beside it. RSI is on from above the first cut to above the last.
     inputs : files and folders that must not be overwritten, beside those that the tables name.
     toolpath : needed with Targets that leave out corners of it; the others have their own.
-    complete : returns the Forecast that ``source`` becomes, for a program without pilot force: it is written
-        and read back while this runs, and again where what is found then changes it.
 
     Raises
     ------
@@ -152,61 +141,93 @@ def write_krl(
     >>> [file.name for file in program.files]
     ['WRITTEN.src', 'WRITTEN.dat', 'WRITTEN.pilot.csv']
     """
-    # the steps of writing in their order, kept together: most branches are the function's options
-    targets, cell = (source, cell) if isinstance(source, Targets) else (source.targets, source.cell)
-    if cell is None:
-        raise input_error("option-value", "write_krl needs a cell with Targets")
-    original = toolpath if isinstance(source, Targets) else source.toolpath
-    if targets.simplified is not None and original is None:
-        sentence = "the targets leave out corners, which only their Toolpath tells"
-        raise input_error("option-value", sentence, "give write_krl the toolpath too")
+    forecast = _forecast_of(source, cell, toolpath)
+    targets, cell = forecast.targets, forecast.cell
     file, of_name = _named(path, name, targets.source, cell)
     of_name += version_issues(cell)
     if online is not None:
         _refuse_name(online, file)
         of_name += [*online_issues(targets, cell), *retract_issues(targets, cell)]
-    joints = solve_ptp_joints(targets, cell) if joints is None else joints
-
+    joints = robot.ptp_joints(targets, cell) if joints is None else joints
     arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
-    of_name += about_curves
-
-    def layout(known: Targets | Prediction | Forecast) -> Layout:
-        return Layout(
-            guard,
-            split if file is not None else "defs",
-            single_file=file is None,
-            options=options,
-            allowed=header_words([*of_name, *known.issues], allow),
-            forces=not isinstance(known, Targets) and known.has_forces,
-            online=online or "",
-            collisions=_scope(known, cell),
-            arcs=tuple(arcs),
-            splines=tuple(splines),
-        )
-
+    found = [*of_name, *about_curves, *forecast.issues]
+    issues = list(released(found, allow, strict))
+    layout = Layout(
+        guard,
+        split if file is not None else "defs",
+        single_file=file is None,
+        options=options,
+        allowed=header_words(found, allow),
+        forces=forecast.has_forces,
+        online=online or "",
+        collisions=_scope(forecast),
+        arcs=tuple(arcs),
+        splines=tuple(splines),
+    )
+    plan = _pilot_plan(forecast, "none" if arcs or splines else pilot, joints, file is not None)
     program_name = file.stem.upper() if file is not None else (name or "PART").upper()
-    bare = Content(targets, joints)
     with ProgramFiles(file, program_name, [*_inputs(targets, cell), *inputs]) as files:
-        composer = Composer(cell, files, original)
-        if complete is not None:
-            source = composer.composed_while(complete, bare, layout(source))
-        issues = list(released([*of_name, *source.issues], allow, strict))
-        plan = _pilot_plan(source, "none" if arcs or splines else pilot, joints, file is not None)
-        give_back()
-        content = bare if plan is None or isinstance(plan, Issue) else Content.of(plan)
-        report = composer.composed(content, layout(source))
+        written = _Writing(files, layout, cell, forecast.toolpath)
+        plain = _Content(targets, joints)
+        content = plain if not isinstance(plan, PilotPlan) else _Content.of(plan)
+        report = written.read_back(content)
         failure = _pilot_failure(report) if pilot is None else None
         if failure is not None:
-            plan, content = left_out(failure), bare
-            report = composer.composed(content, layout(source))
+            plan, content = left_out(failure), plain
+            report = written.read_back(content)
         issues += released(_issues_of(plan), (), strict)
-        issues += released(_size_issues(files.contents, content.targets, cell), (), strict)
+        issues += released(_size_issues(files.texts, content.targets, cell), (), strict)
         if not report.ok:
             raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
-        written = files.take_places()
-    return WrittenProgram(
-        program_name, tuple(written), files.contents, report, tuple(issues), content.targets
-    )
+        places = files.take_places()
+    return WrittenProgram(program_name, tuple(places), files.texts, report, tuple(issues), content.targets)
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What a program says: its motions, and a pilot force or none."""
+
+    targets: Targets
+    joints: Joints
+    text: PilotText | None = None
+    case: PilotCase | None = None
+
+    @classmethod
+    def of(cls, plan: PilotPlan) -> "_Content":
+        return cls(plan.targets, plan.joints, plan.text, plan.case)
+
+
+@dataclass(frozen=True)
+class _Writing:
+    """Where a program goes, how it is laid out, and the Toolpath that it is held against."""
+
+    files: ProgramFiles
+    layout: Layout
+    cell: Cell
+    original: Toolpath | None
+
+    def read_back(self, content: _Content) -> VerifyReport:
+        """Write a program; return what reading it back finds."""
+        targets, joints, files = content.targets, content.joints, self.files
+        files.write(compose(targets, joints, self.cell, files.name, self.layout, content.text))
+        program = read_texts(files.texts, f"{files.name}{w.SOURCE_SUFFIX}")
+        return compare(program, targets, joints, self.cell, pilot=content.case, original=self.original)
+
+
+def _forecast_of(
+    source: Targets | Prediction | Forecast, cell: Cell | None, toolpath: Toolpath | None
+) -> Forecast:
+    """Return what is known of a program: of targets alone nothing of their motion."""
+    if isinstance(source, Forecast):
+        return source
+    if isinstance(source, Prediction):
+        return forecast_of(source)
+    if cell is None:
+        raise input_error("option-value", "write_krl needs a cell with Targets")
+    if source.simplified is not None and toolpath is None:
+        sentence = "the targets leave out corners, which only their Toolpath tells"
+        raise input_error("option-value", sentence, "give write_krl the toolpath too")
+    return Forecast.of_targets(source, toolpath, cell)
 
 
 def _curves(
@@ -253,35 +274,33 @@ def _about_splines(splines: list[Chain]) -> Iterator[Issue]:
         yield Issue("note", "spline", 0, sentence, "measure one with the controller's trace")
 
 
-def _scope(source: Targets | Prediction | Forecast, cell: Cell) -> CollisionScope | None:
+def _scope(forecast: Forecast) -> CollisionScope | None:
     """Return what has been checked for collisions."""
-    if isinstance(source, Targets):
+    if not forecast.has_motion:
         return None
-    tools = [int(number) for number in np.unique(source.targets.tool)]
-    return collision_scope(cell, tools, is_cut=source.has_forces)
+    tools = [int(number) for number in np.unique(forecast.targets.tool)]
+    return collision_scope(forecast.cell, tools, is_cut=forecast.has_forces)
 
 
 def _pilot_plan(
-    source: Targets | Prediction | Forecast, form: PilotForm | None, joints: Joints, sidecar: bool
+    forecast: Forecast, form: PilotForm | None, joints: Joints, sidecar: bool
 ) -> PilotPlan | Issue | None:
     """Return the pilot force to write, None where there is none to write or it is not wanted.
 
     One that was not asked for by name is left out where it cannot be announced, with a finding.
     """
     asked = form is not None
-    if isinstance(source, Targets):
-        if form in ("index", "values"):
-            sentence = f"pilot {form}: Targets have no forces"
-            raise input_error("option-value", sentence, "give write_krl a prediction with forces")
-        return None
+    if not forecast.has_motion and form in ("index", "values"):
+        sentence = f"pilot {form}: Targets have no forces"
+        raise input_error("option-value", sentence, "give write_krl a prediction with forces")
     if form is None:
-        form = source.cell.pilot.form if sidecar and source.has_forces else "none"
+        form = forecast.cell.pilot.form if sidecar and forecast.has_forces else "none"
     if form == "none":
         return None
     if form == "index" and not sidecar:
         sentence = "--pilot index needs the sidecar .pilot.csv, which standard output cannot carry"
         raise input_error("option-value", sentence, "give -o part.src, or --pilot values")
-    return plan_pilot(source, joints, form, sidecar, asked=asked)
+    return plan_pilot(forecast, joints, form, sidecar, asked=asked)
 
 
 def _named(
@@ -324,10 +343,10 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
     return [name for name in named if name]
 
 
-def _size_issues(contents: Mapping[str, Stored], targets: Targets, cell: Cell) -> list[Issue]:
+def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
     beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
-    program = (text for name, text in contents.items() if not name.endswith(beside))
-    size_mb = sum(text.size_bytes for text in program) / BYTES_PER_MB
+    program = (text for name, text in texts.items() if not name.endswith(beside))
+    size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:
         sentence = (

@@ -86,7 +86,8 @@ def largest(vectors: Floats) -> float:
 class Forecast:
     """What is kept of a prediction while its samples pass by; see `Prediction`."""
 
-    toolpath: Toolpath
+    toolpath: Toolpath | None
+    """None where targets alone are known."""
     targets: Targets
     cell: Cell
     issues: tuple[Issue, ...]
@@ -97,6 +98,16 @@ class Forecast:
     """None where forces are not known."""
     pilot: PilotForce | None
     """None where forces are not known."""
+
+    @classmethod
+    def of_targets(cls, targets: Targets, toolpath: Toolpath | None, cell: Cell) -> "Forecast":
+        """Return what is known before a motion is planned."""
+        return cls(toolpath, targets, cell, targets.issues, np.nan, np.nan, None, None)
+
+    @property
+    def has_motion(self) -> bool:
+        """True where the motion is known."""
+        return not np.isnan(self.time_s)
 
     @property
     def has_forces(self) -> bool:

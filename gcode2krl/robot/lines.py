@@ -1,7 +1,7 @@
 """The straight lines of a program, sampled: a limit or a singularity may lie between two targets."""
 
 import functools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from gcode2krl.cell.carriers import most_of
 from gcode2krl.cell.tool_tips import Rows, external_starts, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.inputs import distinct
-from gcode2krl.compiled.long_columns import by_regions
 from gcode2krl.robot.branch import Path
 from gcode2krl.tables import Targets
 from gcode2krl.units import RAD_PER_DEG
@@ -136,18 +135,12 @@ def sample_lines(targets: Targets, cell: Cell, start: int, end: int) -> Line:
 
 def samples_at(targets: Targets, cell: Cell, counts: Ints, samples: Ints) -> Line:
     """Return the line thinned to some of its rising samples (t,); ``counts`` as from `count_samples`."""
-
-    def at(samples: Ints) -> Line:
-        target = np.searchsorted(counts, samples, side="right")
-        rows = distinct(target)
-        which = np.searchsorted(rows, target)
-        motions = _motions(targets, cell, rows)
-        part = (samples - (counts[target] - motions.steps[which]) + 1) / motions.steps[which]
-        return _line(targets, motions, rows, target, which, part)
-
-    lines = by_regions(samples, at)
-    columns = {spec.name: [getattr(line, spec.name) for line in lines] for spec in fields(Line)}
-    return Line(**{name: np.concatenate(parts) for name, parts in columns.items()})
+    target = np.searchsorted(counts, samples, side="right")
+    rows = distinct(target)
+    which = np.searchsorted(rows, target)
+    motions = _motions(targets, cell, rows)
+    part = (samples - (counts[target] - motions.steps[which]) + 1) / motions.steps[which]
+    return _line(targets, motions, rows, target, which, part)
 
 
 def _line(targets: Targets, motions: _Motions, rows: Rows, target: Ints, which: Rows, part: Floats) -> Line:

@@ -8,11 +8,11 @@ import numpy as np
 
 from gcode2krl import krl_words as w
 from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, collect
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.files import make_folder, refuse_inputs, write_together
 from gcode2krl.krl import output_files, write_krl
 from gcode2krl.krl.release import released
-from gcode2krl.pipeline import checked, predict_toolpath
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit.accepted import Accepted, read_program, toolpath_of
 from gcode2krl.runkit.checklist import page
@@ -64,8 +64,8 @@ def make_kit(
     path, place = Path(program), Path(folder)
     accepted = read_program(path, cell)
     air_name = accepted.name[: w.LONGEST_NAME - len(_SUFFIX)] + _SUFFIX
-    itself = _predicted(checked(accepted.targets, cell)[0], cell)
-    air = _predicted(checked(lifted(accepted.targets, lift_mm), cell)[0], cell)
+    itself = _predicted(accepted.targets, cell)
+    air = _predicted(lifted(accepted.targets, lift_mm), cell)
     released(air.issues, ())
     make_folder(place)
     texts = {
@@ -94,7 +94,7 @@ def lifted(targets: Targets, lift_mm: float) -> Targets:
 
 
 def _predicted(targets: Targets, cell: Cell) -> Prediction:
-    return predict_toolpath(toolpath_of(targets, cell), cell, targets=targets, forces=False)
+    return collect(Plan.of(toolpath_of(targets, cell), targets, cell).judged(), forces=False)
 
 
 def _options(accepted: Accepted, lift_mm: float) -> str:

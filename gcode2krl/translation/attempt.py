@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.result import cell_of, hashes_of, input_of, record_of
-from gcode2krl.translation.from_line import restart_record
 from gcode2krl.translation.inputs import STANDARD, StandardInput
 from gcode2krl.translation.order import Order
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
+    from gcode2krl.chain import Plan
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Joints, Targets, Toolpath
+    from gcode2krl.tables import Toolpath
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,8 @@ class Attempt:
     cell: "Cell | None" = None
     """As resolved, under the job."""
     toolpath: "Toolpath | None" = None
-    targets: "Targets | None" = None
-    joints: "Joints | None" = None
-    """At the targets."""
+    plan: "Plan | None" = None
+    """What the robot would be told, and its joints there."""
     corner_mm: float | None = None
     """The largest corner error."""
     forecast: "Forecast | None" = None
@@ -56,7 +55,11 @@ class Attempt:
     @cached_property
     def record(self) -> dict[str, Any]:
         """The record of the translation (``docs/record.md``); what refuses a program keeps its figures."""
-        restart = restart_record(self.toolpath) if self.toolpath is not None else {}
+        restart: dict[str, Any] = {}
+        if self.toolpath is not None:
+            from gcode2krl.restart.rows import restart_record
+
+            restart = restart_record(self.toolpath)
         return record_of(
             "translate",
             self._figures() | restart,

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gcode2krl.errors import input_error
+from gcode2krl.files.program_names import program_stem
 from gcode2krl.translation.inputs import STANDARD
 from gcode2krl.translation.order import Order
 
@@ -67,3 +68,28 @@ def refuse_early(targets: "Targets", cell: "Cell", order: Order) -> None:
     issues = [*targets.issues, *version_issues(cell), *(online_issues(targets, cell) if online else ())]
     if any(issue.severity == "error" for issue in issues):
         released(issues, matching(issues, order.allow))
+
+
+def refuse_without_forces(from_line: int | None, no_forces: bool) -> None:
+    """Raise where a restart is wanted without the material removal that judges it."""
+    if from_line is not None and no_forces:
+        sentence = "--from-line needs the material as cut so far, which --no-forces leaves out"
+        raise input_error("option-value", sentence, "leave out --no-forces")
+
+
+def restart_name(
+    part: str, name: str | None, output: str | None, from_line: int | None, cell: "Cell"
+) -> str | None:
+    """Return the name of the program: ``part_from4812`` for a restart, where nothing names it."""
+    into_folder = output is None or (output not in ("", STANDARD) and Path(output).is_dir())
+    if from_line is None or name is not None or part == STANDARD or not (into_folder or output == STANDARD):
+        return name
+    from gcode2krl.krl.names import name_problem, suggested_name
+    from gcode2krl.krl_words import LONGEST_NAME
+
+    externals, suffix = cell.program.externals, f"_from{from_line}"
+    whole = f"{program_stem(part)}{suffix}"
+    if not name_problem(whole, externals):
+        return whole
+    stem = suggested_name(program_stem(part), externals)[: LONGEST_NAME - len(suffix)]
+    return suggested_name(f"{stem}{suffix}", externals)

@@ -27,8 +27,8 @@ def compensated(
     RefusedError
         Where there is no deflection, or it is too uncertain to move a robot by it.
     """
+    from gcode2krl.blockwise import plan_course
     from gcode2krl.compensation.iteration import compensate, keeping_forces
-    from gcode2krl.pipeline import clearance_along
 
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     if motion is None or forces is None or deflection is None:
@@ -53,6 +53,7 @@ def compensated(
     )
     if plot is not None:
         _draw(done, motion, Path(plot), inputs)
+    near = plan_course(done.targets, cell, float(prediction.inputs["dt_s"]), keeps=True).samples().clearance
     return replace(
         prediction,
         targets=done.targets,
@@ -61,7 +62,7 @@ def compensated(
         forces=forces,
         deflection=deflection,
         inputs={**prediction.inputs, "compensate": "offline", **done.figures},
-        clearance=clearance_along(motion),
+        clearance=near,
     )
 
 

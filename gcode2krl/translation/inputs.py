@@ -94,6 +94,28 @@ def read_part(
     )
 
 
+def read_from_line(
+    part: str,
+    cell: "Cell",
+    chord_tolerance_mm: float,
+    block_delete: bool,
+    tolerance_mm: float | None,
+    from_line: int | None,
+    begin: Begin = unseen,
+    standard: StandardInput | None = None,
+    dialect: str = DIALECT_NAMES[0],
+    search: Sequence[str | Path] = (),
+) -> "Toolpath":
+    """Read G-code, from a line on where one is named; see `read_part`."""
+    toolpath = read_part(part, cell, chord_tolerance_mm, block_delete, begin, standard, dialect, search)
+    if from_line is None:
+        return toolpath
+    from gcode2krl.restart.material import restarted
+
+    begin("cutting the lines before")
+    return restarted(toolpath, from_line, cell, tolerance_mm)
+
+
 def require_search(folders: Sequence[str | Path]) -> None:
     """Refuse what is no folder where folders with subprograms are wanted."""
     for folder in folders:

@@ -8,8 +8,14 @@ from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.files.program_names import DIALECT_NAMES, program_stem
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.translation.attempt import Attempt
-from gcode2krl.translation.checks import outputs_of, place_of, refuse_early, refuse_online
-from gcode2krl.translation.from_line import read_from_line, refuse_without_forces, restart_name
+from gcode2krl.translation.checks import (
+    outputs_of,
+    place_of,
+    refuse_early,
+    refuse_online,
+    refuse_without_forces,
+    restart_name,
+)
 from gcode2krl.translation.inputs import (
     STANDARD,
     StandardInput,
@@ -17,6 +23,7 @@ from gcode2krl.translation.inputs import (
     existing,
     files_of_job,
     read_cell_under_job,
+    read_from_line,
     require_part,
 )
 from gcode2krl.translation.order import Order
@@ -29,13 +36,12 @@ from gcode2krl.translation.page import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from gcode2krl.cell import Cell
+    from gcode2krl.chain import Plan
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Joints, Targets, Toolpath
+    from gcode2krl.tables import Toolpath
 
 
 _Stage = TypeVar("_Stage")
@@ -47,8 +53,7 @@ class _Known:
 
     cell: "Cell | None" = None
     toolpath: "Toolpath | None" = None
-    targets: "Targets | None" = None
-    joints: "Joints | None" = None
+    plan: "Plan | None" = None
     corner_mm: float | None = None
     forecast: "Forecast | None" = None
     written: "WrittenProgram | None" = None
@@ -77,12 +82,9 @@ def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
     ``begin`` is told the name of each stage as it begins. No `Gcode2KrlError` leaves: it is the attempt's
     ``error``, beside what was known when it came. Nothing is printed.
     """
-    from gcode2krl.compiled.long_columns import long_columns_on_disk
-
     known, error = _Known(), None
     try:
-        with long_columns_on_disk():
-            _translate(order, known, begin)
+        _translate(order, known, begin)
     except Gcode2KrlError as refused:
         error = _with_page(order, refused, known)
     return Attempt(order, error, **vars(known))
@@ -102,9 +104,6 @@ def _carry_on(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
     _read(order, ready, known, begin)
     begin("planning")
     _plan(order, ready.cell, known)
-    if order.no_forces and order.compensate is None and order.report is None:
-        known.written = _write_meanwhile(order, ready, known, begin)
-        return
     prediction = _predict(order, ready, known, begin)
     begin("writing and reading back")
     written = _write(order, ready, known, _done(known.forecast))
@@ -152,64 +151,34 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
 
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
-    """Set the targets, and refuse those that a robot cannot run; tables that wait are kept on disk."""
-    from gcode2krl.compiled.memory import give_back
-    from gcode2krl.files.spool import on_disk
-    from gcode2krl.pipeline import judged_targets
+    """Set the targets, and refuse those that a robot cannot run."""
+    from gcode2krl.chain import prepare
 
-    toolpath = _done(known.toolpath)
-    known.targets, joints, known.corner_mm = judged_targets(
-        toolpath, cell, order.tolerance_mm, order.simplify_mm
-    )
-    refuse_early(known.targets, cell, order)
-    known.toolpath, known.joints = on_disk(toolpath), on_disk(joints)
-    del toolpath, joints
-    give_back()
+    prepared = prepare(_done(known.toolpath), cell, order.tolerance_mm, order.simplify_mm)
+    known.plan, known.corner_mm = prepared.with_corners(order.tolerance_mm)
+    refuse_early(known.plan.targets, cell, order)
 
 
 def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Prediction | None":
     """Foresee motion, forces and deflection; returns whole tables where something needs them."""
-    from gcode2krl.compiled.memory import give_back
-    from gcode2krl.pipeline import forecast_of, forecast_toolpath, predict_toolpath, solve_joints
+    from gcode2krl.chain import Plan, collect, forecast_of, foresee
 
-    toolpath, targets, forces = _done(known.toolpath), _done(known.targets), not order.no_forces
-    prediction: Prediction | None = None
-    if order.compensate == "offline" or order.report is not None:
-        prediction = predict_toolpath(toolpath, ready.cell, targets=targets, forces=forces, begin=begin)
-    if order.compensate == "offline" and prediction is not None:
+    plan, forces = _done(known.plan), not order.no_forces
+    if order.compensate is None and order.report is None:
+        known.forecast = foresee(plan, forces=forces, begin=begin)
+        return None
+    prediction = collect(plan, forces=forces, begin=begin)
+    if order.compensate == "offline":
         from gcode2krl.translation.compensation import compensated
 
         begin("compensation")
         prediction = compensated(prediction, order.compensate_plot, ready.inputs)
-        known.joints = solve_joints(prediction.targets, ready.cell)
-    if prediction is not None:
-        known.forecast = forecast_of(prediction)
-    else:
-        known.forecast = forecast_toolpath(toolpath, ready.cell, targets, forces=forces, begin=begin)
-    give_back()
+        known.plan = Plan.of(plan.toolpath, prediction.targets, ready.cell)
+    known.forecast = forecast_of(prediction)
     return prediction
 
 
-def _write_meanwhile(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "WrittenProgram":
-    """Write a program whose text does not depend on forces while its motion is planned."""
-    from gcode2krl.pipeline import forecast_begun
-
-    def complete() -> "Forecast":
-        _predict(order, ready, known, begin)
-        begin("writing and reading back")
-        return _done(known.forecast)
-
-    begun = forecast_begun(_done(known.toolpath), ready.cell, _done(known.targets))
-    return _write(order, ready, known, begun, complete)
-
-
-def _write(
-    order: Order,
-    ready: _Ready,
-    known: _Known,
-    forecast: "Forecast",
-    complete: "Callable[[], Forecast] | None" = None,
-) -> "WrittenProgram":
+def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> "WrittenProgram":
     """Write the program and read it back."""
     from gcode2krl.krl import suggested_name, write_krl
 
@@ -219,7 +188,7 @@ def _write(
     return write_krl(
         forecast,
         ready.place,
-        joints=known.joints,
+        joints=_done(known.plan).joints,
         name=name,
         allow=order.allow,
         guard=not order.no_guard,
@@ -229,7 +198,6 @@ def _write(
         pilot=order.pilot,
         online=order.online,
         inputs=ready.inputs,
-        complete=complete,
     )
 
 
@@ -247,7 +215,7 @@ def _with_page(order: Order, error: Gcode2KrlError, known: _Known) -> Gcode2KrlE
         return unwritable
     known.page = page
     if prediction is not None and known.forecast is None:
-        from gcode2krl.pipeline import forecast_of
+        from gcode2krl.chain import forecast_of
 
         known.forecast = forecast_of(prediction)
     return error

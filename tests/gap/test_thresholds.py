@@ -13,7 +13,7 @@ from gcode2krl.gap.thresholds.stated import Kind, Threshold, convention, listed
 
 ROOT = Path(__file__).parents[2]
 ALL = list(listed(THRESHOLDS))
-FIRST_SCORED = 16_000
+FIRST_SCORED = 30_000
 """Seeds from here on are scored: nothing may be chosen on them (docs/diagnose_check.md)."""
 
 

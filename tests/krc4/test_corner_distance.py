@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, plan_motion, set_targets
+from gcode2krl.chain import corner_errors
 from gcode2krl.krc4 import build_chain
 from gcode2krl.krc4.laws import parabola_distance
-from gcode2krl.pipeline import corner_errors
 from tests.krl.conftest import read
 
 HEAD = "G21 G90 G17 G54\nT1 M6\nS9000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\nG64 P0.05\nG1 Z0 F600\n"

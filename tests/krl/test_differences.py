@@ -12,15 +12,17 @@ from gcode2krl.krl import differences, rules
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.differences import differences_of
 from gcode2krl.krl.read import read_texts
-from gcode2krl.pipeline import solve_ptp_joints
+from gcode2krl.robot import ptp_joints
 
 
 @pytest.fixture(scope="module")
 def case():
     cell = load_cell()
     targets = set_targets(read_gcode("examples/raster_finish.nc", cell), cell)
-    joints = solve_ptp_joints(targets, cell)
-    return read_texts(compose(targets, joints, cell, "PART", Layout()), "PART.src"), targets, joints, cell
+    joints = ptp_joints(targets, cell)
+    files = compose(targets, joints, cell, "PART", Layout())
+    texts = {name: b"".join(pieces) for name, pieces in files.items()}
+    return read_texts(texts, "PART.src"), targets, joints, cell
 
 
 def damaged(program, seed):

@@ -16,7 +16,7 @@ import pytest
 
 from gcode2krl import Cell, set_targets, write_krl
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.restart import restarted
+from gcode2krl.restart.material import restarted
 from gcode2krl.tables import Targets
 from tests.cells import over_demonstration
 from tests.conftest import draws

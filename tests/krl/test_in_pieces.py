@@ -6,16 +6,13 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import pytest
 
 from gcode2krl import set_targets, verify_krl, write_krl
 from gcode2krl.cell import resolve_cell
-from gcode2krl.compiled.long_columns import columns_on_disk, long_columns_on_disk
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.files import stored
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl import composition, read_krl
 from tests.conftest import HEEDS_CTRL_C, ROOT
@@ -47,15 +44,9 @@ WAYS = {
 
 
 @pytest.fixture
-def small(monkeypatch, tmp_path):
-    """Everything is long: texts, columns and the pieces they are made of."""
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+def small(monkeypatch):
+    """The program is written in many pieces."""
     monkeypatch.setattr(composition, "PIECE_ROWS", 70)
-    monkeypatch.setattr(stored, "SHORT_BYTES", 300)
-    monkeypatch.setattr(stored, "_PIECE_BYTES", 1000)
-    monkeypatch.setattr("gcode2krl.compiled.long_columns.LONG_BYTES", 4096)
-    monkeypatch.setattr("gcode2krl.files.spool._IN_MEMORY_BYTES", 1000)
 
 
 def contents(folder):
@@ -81,9 +72,6 @@ def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request
     if way != "offline":
         again = run("verify", "part.src", "part.nc", "--cell", "cell.toml", "--json")
         assert again.code == 0, again.out
-    assert list((tmp_path / "temporary").iterdir()) == []
-    if way != "offline":  # what is known of its motion stays for the next question
-        assert columns_on_disk() == 0
 
 
 @pytest.fixture
@@ -95,14 +83,12 @@ def targets(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["PART", None])
-def test_texts_are_read_where_they_are_asked_for(targets, tmp_path, small, name):
+def test_texts_are_those_of_the_files(targets, tmp_path, small, name):
     """Of a program in files, and of one without."""
     _, rows, cell = targets
     written = write_krl(rows, tmp_path / "part.src" if name else None, cell)
     assert set(written.texts) == ({"PART.src", "PART.dat"} if name else {"PART.src"})
     assert written.size_bytes == sum(map(len, written.texts.values()))
-    for part, text in written.contents.items():
-        assert b"".join(text.pieces()) == written.texts[part]
     if name:
         assert list(written.texts.values()) == [file.read_bytes() for file in written.files]
 
@@ -126,7 +112,7 @@ def test_a_refused_program_leaves_no_file(targets, tmp_path, small, monkeypatch)
     monkeypatch.setattr(composition, "turn_bits", lambda q_rad: 99)
     with pytest.raises(RefusedError, match="S or T differs"):
         write_krl(rows, tmp_path / "part.src", cell)
-    assert sorted(file.name for file in tmp_path.rglob("*")) == ["part.nc", "temporary"]
+    assert sorted(file.name for file in tmp_path.rglob("*")) == ["part.nc"]
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
@@ -142,24 +128,19 @@ def test_what_ends_the_writing_leaves_no_file(targets, tmp_path, small, monkeypa
 
     monkeypatch.setattr(composition, "motion_lines", ended)
     wanted = NotUnderstoodError if isinstance(error, OSError) else KeyboardInterrupt
-    with pytest.raises(wanted), long_columns_on_disk():
+    with pytest.raises(wanted):
         write_krl(rows, tmp_path / "part.src", cell)
-    assert sorted(file.name for file in tmp_path.rglob("*")) == ["part.nc", "temporary"]
+    assert sorted(file.name for file in tmp_path.rglob("*")) == ["part.nc"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there Ctrl+C reaches all of the console's programs")
 def test_an_interrupted_run_leaves_no_file(tmp_path):
-    """Ctrl+C while the program is written; its columns and its text lie in files then."""
+    """Ctrl+C while the program is written."""
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
-    temporary = tmp_path / "tmp"
-    temporary.mkdir()
     code = """
 import sys, time
-from gcode2krl.compiled import long_columns
-from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.files import stored
 from gcode2krl.krl import composition
-long_columns.LONG_BYTES, stored.SHORT_BYTES, composition.PIECE_ROWS = 4096, 300, 70
+composition.PIECE_ROWS = 70
 lines = composition.motion_lines
 def slow(*arguments):
     print("writing", flush=True)
@@ -169,7 +150,7 @@ composition.motion_lines = slow
 from gcode2krl.cli.main import main
 main(["part.nc", "-o", "part.src", "--no-forces"])
 """
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=tmp_path,
@@ -184,20 +165,15 @@ main(["part.nc", "-o", "part.src", "--no-forces"])
     _, said = process.communicate(timeout=30)
     assert process.returncode != 0
     assert b"Traceback" not in said
-    assert sorted(file.name for file in Path(tmp_path).iterdir()) == ["part.nc", "tmp"]
-    assert list(temporary.iterdir()) == []
+    assert sorted(file.name for file in Path(tmp_path).iterdir()) == ["part.nc"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no such limit")
 def test_a_full_disk_is_one_line(tmp_path):
-    """No file may be longer than 20 kB: neither a column nor the program."""
+    """No file may be longer than 20 kB."""
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
     code = """
 import resource, sys
-from gcode2krl.compiled import long_columns
-from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.files import stored
-long_columns.LONG_BYTES, stored.SHORT_BYTES = 4096, 300
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 from gcode2krl.cli.main import main
 main(["part.nc", "-o", "part.src", "--no-forces", "-q"])

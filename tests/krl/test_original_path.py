@@ -16,7 +16,7 @@ from gcode2krl.gcode import read_stream
 from gcode2krl.krl.composition import Layout, compose
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.verify import compare
-from gcode2krl.pipeline import solve_ptp_joints
+from gcode2krl.robot import ptp_joints
 from gcode2krl.tables import Simplified, rows_at
 
 CELL = resolve_cell({"based_on": "demonstration"})
@@ -234,8 +234,9 @@ def test_no_simplified_program_is_refused(blocks, simplify_mm):
     head = "\n".join(PART.split("\n")[:8])
     toolpath = toolpath_of(f"{head}\nF1200\n{body}\nG0 Z20\nM5\nM30\n")
     targets = set_targets(toolpath, CELL, None, simplify_mm)
-    joints = solve_ptp_joints(targets, CELL)
-    texts = compose(targets, joints, CELL, "PART", Layout())
+    joints = ptp_joints(targets, CELL)
+    files = compose(targets, joints, CELL, "PART", Layout())
+    texts = {name: b"".join(pieces) for name, pieces in files.items()}
     report = compare(read_texts(texts, "PART.src"), targets, joints, CELL, original=toolpath)
     assert not [issue for issue in report.issues if issue.code == "verify-original"]
     assert report.original.left_out >= targets.simplified.left_out

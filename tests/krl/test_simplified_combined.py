@@ -8,7 +8,7 @@ import pytest
 from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.pipeline import predict_toolpath
-from gcode2krl.restart import restarted
+from gcode2krl.restart.material import restarted
 from gcode2krl.translation.compensation import compensated
 
 CELL = resolve_cell(

@@ -163,7 +163,7 @@ def test_what_costs_time_is_said_with_line_and_seconds(cell):
 
 
 def test_a_tolerance_asked_for_is_kept(cell):
-    from gcode2krl.pipeline import corner_errors
+    from gcode2krl.chain import corner_errors
 
     moves = "G1 Z0 F900\nX10\nY10\nX30 Y15\nX31\nX30.5 Y30\nG0 Z50\nM30\n"
     text = f"G21 T1 M6\nS9000 M3\nG0 G43 H1 Z50\nX0 Y0\n{moves}"
@@ -183,7 +183,7 @@ def test_a_tolerance_asked_for_is_kept(cell):
 
 
 def test_an_added_approach_is_not_held_to_the_tolerance_of_the_part(cell):
-    from gcode2krl.pipeline import corner_errors
+    from gcode2krl.chain import corner_errors
 
     head = "G21 T1 M6\nS9000 M3\nG64 P0.01\nG0 G43 H1 Z50\nX0 Y0\n"
     toolpath = _toolpath(

@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl import frames as fr
 from gcode2krl.cell import resolve_cell
-from gcode2krl.pipeline import checked
+from gcode2krl.chain import Plan
 from gcode2krl.program.table import below_table, lowest_points
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"
@@ -42,7 +42,8 @@ def test_the_first_position_counts_as_the_approach_goes_there(plan):
 def test_compensated_targets_are_looked_at_again(plan):
     found = plan(HEAD + "G0 X0 Y0\nG1 Z-10 F600\nG1 X50\nG0 Z30\nM5\nM30\n", TABLE)
     moved = found.targets.position_mm - [0.0, 0.0, 0.05]
-    again = checked(replace(found.targets, position_mm=moved, issues=()), found.cell)[0]
+    targets = replace(found.targets, position_mm=moved, issues=())
+    again = Plan.of(found.toolpath, targets, found.cell).judged().targets
     assert [issue.line for issue in again.issues if issue.code == "below-table"] == [6]
 
 

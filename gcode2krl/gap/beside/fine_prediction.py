@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from gcode2krl.blockwise import plan_course
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.beside.interpolation import cubic
 from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.pipeline import plan_motion, solve_joints
 from gcode2krl.prediction import Prediction
 
 LIMITS = THRESHOLDS.beside
@@ -25,17 +25,19 @@ def refined_prediction(prediction: Prediction) -> Prediction:
     if float(np.median(np.diff(motion.time_s))) <= LIMITS.fine_step_s * 1.01:
         return prediction
     try:
-        fine = plan_motion(prediction.targets, prediction.cell, LIMITS.fine_step_s, watches=False)
+        targets, cell = prediction.targets, prediction.cell
+        kept = plan_course(targets, cell, LIMITS.fine_step_s, keeps=True, watches=False).samples()
+        fine = kept.motion
         again = cubic(motion.time_s, fine.time_s, fine.position_mm)
         apart = np.linalg.norm(again - motion.position_mm, axis=1)
         if float(np.sqrt(np.mean(apart**2))) > LIMITS.fine_same_mm:
             return prediction
-        joints = solve_joints(fine, prediction.cell)
+        joints = kept.joints(cell)
         forces = None
         if prediction.forces is not None:
             from gcode2krl.cutting import cut
 
-            forces = cut(prediction.toolpath, fine, prediction.cell)
+            forces = cut(prediction.toolpath, fine, cell)
     except Gcode2KrlError:
         return prediction
     inputs = {**prediction.inputs, "dt_s": LIMITS.fine_step_s}

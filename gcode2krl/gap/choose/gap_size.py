@@ -173,7 +173,8 @@ def _loud_in_step(traces: Sequence[Trace], left: Sequence[Floats], noise: Sequen
     if traces[0].link.model_rms or traces[0].still:
         return 0.0
     changes = [_by_moments(command_changes(each).astype(np.float64), each) for each in traces]
-    is_changing, shares = np.concatenate(changes).any(axis=1), [0.0]
+    is_changing = np.asarray(np.concatenate(changes).any(axis=1), dtype=np.bool_)
+    shares = [0.0]
     for j, component in enumerate(noise):
         rows = [
             _by_moments(component.whiten(rest[:, [j]], trace.segments)[:, 0], trace)

@@ -8,7 +8,7 @@ import pytest
 
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
-from gcode2krl.program.restart import ENTRY_MM_S, approached_row, begun_at, begun_row, row_before, state_words
+from gcode2krl.restart.rows import ENTRY_MM_S, approached_row, begun_at, begun_row, row_before, state_words
 from gcode2krl.tables import Restart
 
 PROGRAM = """G21 G90 G17

@@ -1,6 +1,6 @@
 """A Toolpath that begins at a later G-code line: which row that is, and what is in force there.
 
-Nothing here asks the material; `gcode2krl.restart` does, and says where the way down may begin.
+Nothing here asks the material; `restart.material` does, and says where the way down may begin.
 """
 
 from collections.abc import Iterator
@@ -154,6 +154,21 @@ def state_words(toolpath: Toolpath) -> str:
         elif code >= 0:
             words.append(f"M{code}" + (f" S{abs(event.values['rpm']):g}" if event.kind == "spindle" else ""))
     return ", ".join(words)
+
+
+def restart_record(toolpath: Toolpath) -> dict[str, Any]:
+    """Return what ``--json`` says of a restart, empty where the program runs from its start."""
+    restart = toolpath.restart
+    if restart is None:
+        return {}
+    way_mm = toolpath.position_mm[1 : restart.way_rows + 1]
+    record = {
+        "line": restart.line,
+        "begins_line": restart.begins_line,
+        "in_force": state_words(toolpath),
+        "way_mm": [[round(float(value), 3) for value in point] for point in way_mm],
+    }
+    return {"restart": record}
 
 
 def _in_force(toolpath: Toolpath, row: int, above: int) -> tuple[list[Event], list[Issue]]:

@@ -1,4 +1,4 @@
-"""A program that begins at a later G-code line: the material as cut so far, and the way down into it.
+"""The material as cut before a restart, and the way down into it.
 
 The way: HOME, PTP to a point on the tool axis above the first position, at the highest safe height that is
 known; at rapid speed down the axis to just above the material; from there at feed to the start of the line's
@@ -12,10 +12,12 @@ import numpy as np
 from gcode2krl import cutting, krc4, program
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.chain import Plan, prepare
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError
-from gcode2krl.pipeline import plan_motion, targets_and_joints
-from gcode2krl.tables import Joints, Motion, Restart, Targets, Toolpath
+from gcode2krl.pipeline import plan_motion
+from gcode2krl.restart.rows import approached_row, begun_at, begun_row, row_before
+from gcode2krl.tables import Motion, Restart, Toolpath
 
 ABOVE_STOCK_MM = 10.0
 """Least height above the raw part at which the tool arrives: assumed, as the part may stand higher."""
@@ -35,12 +37,15 @@ _MISSING = frozenset({"tool-unknown", "tool-missing"})
 class _Before:
     """The whole program, and what the lines before the restart have left."""
 
-    toolpath: Toolpath
-    targets: Targets
-    joints: Joints
+    plan: Plan
     left: HeightField | None
     to_field: Floats
     """(3, 3) from ``$BASE`` to the frame of the field."""
+
+    @property
+    def toolpath(self) -> Toolpath:
+        """What the G-code says, from its first line on."""
+        return self.plan.toolpath
 
 
 def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | None = None) -> Toolpath:
@@ -54,18 +59,18 @@ def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | N
     Raises
     ------
     NotUnderstoodError
-        Where the line cannot be one to begin at, see `program.begun_row`.
+        Where the line cannot be one to begin at, see `begun_row`.
     RefusedError
         Where a tool used before is missing, or the start of the line lies in material.
     """
-    row = program.begun_row(toolpath, line)
+    row = begun_row(toolpath, line)
     before, issues = _before(toolpath, row, cell, tolerance_mm)
     first = _first_row(before, row, cell)
     if first != row:
         issues.append(_one_before(toolpath, row, first))
     begins = int(toolpath.source_line[first])
     restart = Restart(line=line, begins_line=begins, left=before.left)
-    begun = program.begun_at(toolpath, first, restart, _way(before, first, cell))
+    begun = begun_at(toolpath, first, restart, _way(before, first, cell))
     issues += _other_arm(before, begun, cell, tolerance_mm)
     return replace(begun, issues=(*begun.issues, *issues))
 
@@ -78,22 +83,22 @@ def _before(
 ) -> tuple[_Before, list[Issue]]:
     """Return the program up to a row, and what makes its material doubtful or keeps it from being known."""
     _refuse_missing_tools(toolpath, row, cell)
-    targets, joints = targets_and_joints(toolpath, cell, tolerance_mm)
+    plan = prepare(toolpath, cell, tolerance_mm)
     try:
-        motion = plan_motion(targets, cell, cell.controller.cycle_s, watches=False)
+        motion = plan_motion(plan.targets, cell, cell.controller.cycle_s, watches=False)
         field, to_field = cutting.raw_field(toolpath, motion, cell)
         known = Restart(line=0, begins_line=0, left=field)
-        done = _until(motion, krc4.build_chain(targets, cell), row)
+        done = _until(motion, krc4.build_chain(plan.targets, cell), row)
         removal = cutting.remove(replace(toolpath, restart=known), done, cell)
     except Gcode2KrlError as error:
         sentence = f"the material that the lines before have left is not known: {error.issues[0].message}"
         issue = Issue(
             "error", "restart-stock-unknown", 0, sentence, error.issues[0].advice() or "state [stock]"
         )
-        return _Before(toolpath, targets, joints, None, np.eye(3)), [issue]
+        return _Before(plan, None, np.eye(3)), [issue]
     # a rapid has removed what it met, so what is below it would count as cut
     collisions = [issue for issue in removal.forces.issues if issue.code == _UNTRUE]
-    return _Before(toolpath, targets, joints, removal.part, to_field), collisions
+    return _Before(plan, removal.part, to_field), collisions
 
 
 def _until(motion: Motion, chain: krc4.Chain, row: int) -> Motion:
@@ -148,7 +153,7 @@ def _first_row(before: _Before, row: int, cell: Cell) -> int:
     depth_mm = _depth_mm(before, row, cell)
     if depth_mm <= _CONTACT_MM:
         return row
-    other = program.row_before(before.toolpath, row)
+    other = row_before(before.toolpath, row)
     if other is not None and _depth_mm(before, other, cell) <= _CONTACT_MM:
         return other
     toolpath = before.toolpath
@@ -166,12 +171,12 @@ def _first_row(before: _Before, row: int, cell: Cell) -> int:
 
 def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
     """Return how deep in material the tool stands at the start of a row; of a rapid 0, as its end counts."""
-    at = program.approached_row(before.toolpath, row)
+    at = approached_row(before.toolpath, row)
     if before.left is None or at == row:
         return 0.0
     tip_mm = before.to_field @ before.toolpath.position_mm[at]
-    ends = np.flatnonzero(before.targets.move == at)
-    cdis_mm = float(before.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
+    ends = np.flatnonzero(before.plan.targets.move == at)
+    cdis_mm = float(before.plan.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
     slack_mm = min(0.5 * cdis_mm, _MOST_OF_CORNER_MM)  # no corner is off by more than half of CDIS
     tool = cell.tool[_tool(before, row)]
     return cutting.depth_in_material(before.left, tip_mm, tool, slack_mm)
@@ -179,9 +184,9 @@ def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
 
 def _tool(before: _Before, row: int) -> int:
     """Return the number of the tool whose frame moves in a row; a row that leads nowhere has no target."""
-    move = before.targets.move
+    move = before.plan.targets.move
     so_far = np.flatnonzero((move >= 0) & (move <= row))
-    return int(before.targets.tool[so_far[-1] if len(so_far) else 0])
+    return int(before.plan.targets.tool[so_far[-1] if len(so_far) else 0])
 
 
 def _one_before(toolpath: Toolpath, row: int, first: int) -> Issue:
@@ -196,12 +201,12 @@ def _one_before(toolpath: Toolpath, row: int, first: int) -> Issue:
 
 
 def _way(before: _Before, row: int, cell: Cell) -> Floats:
-    """Return the way (k, 3) from above to the first position of a row, see `program.begun_at`.
+    """Return the way (k, 3) from above to the first position of a row, see `begun_at`.
 
     Empty where that is not known, which the checks of any program refuse.
     """
     toolpath = before.toolpath
-    at = program.approached_row(toolpath, row)
+    at = approached_row(toolpath, row)
     is_feed = not toolpath.rapid[row]
     if is_feed and not toolpath.is_position()[row - 1]:
         return np.zeros((0, 3))
@@ -255,10 +260,9 @@ def _top(field: HeightField, to_field: Floats) -> float:
 
 def _other_arm(before: _Before, begun: Toolpath, cell: Cell, tolerance_mm: float | None) -> list[Issue]:
     """Return a warning where the arm stands otherwise than in the whole program: its branch, or its spin."""
-    targets, joints = targets_and_joints(begun, cell, tolerance_mm)
-    other = _status(joints, targets) != _status(before.joints, before.targets)
-    here, there = (_last_rotation(each) for each in (targets, before.targets))
-    other |= abs(float(here @ there)) < 1.0 - 1e-9
+    here, there = prepare(begun, cell, tolerance_mm), before.plan
+    other = _status(here) != _status(there)
+    other |= abs(float(_last_rotation(here) @ _last_rotation(there))) < 1.0 - 1e-9
     if not other:
         return []
     sentence = "the arm stands otherwise than in the whole program (S and T, or the spin about the tool axis)"
@@ -266,10 +270,10 @@ def _other_arm(before: _Before, begun: Toolpath, cell: Cell, tolerance_mm: float
     return [Issue("warning", "restart-arm", 0, sentence, remedy)]
 
 
-def _status(joints: Joints, targets: Targets) -> int:
-    return int(joints.status[~targets.home][0])
+def _status(plan: Plan) -> int:
+    return int(plan.joints.status[~plan.targets.home][0])
 
 
-def _last_rotation(targets: Targets) -> Floats:
-    rotation: Floats = targets.rotation[~targets.home][-1]
+def _last_rotation(plan: Plan) -> Floats:
+    rotation: Floats = plan.targets.rotation[~plan.targets.home][-1]
     return rotation
