@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints32
-from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.errors import input_error
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import vocabulary as v
@@ -246,6 +246,7 @@ _FANUC: dict[str, Any] = {
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
     "g80_keeps_motion": True,
+    "start": {"retract": v.G98, "retract_line": -1},
     "idle_letters": "D",
 }
 _SINUMERIK_STATEMENTS = {
@@ -335,25 +336,15 @@ _LIST: Final = (
 DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _LIST}
 """The dialects by their names, the default first."""
 DEFAULT: Final = DIALECT_NAMES[0]
-_NOT_READ: Final = {
-    "heidenhain": (
-        "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code",
-        "export the part again with a post for LinuxCNC, Fanuc or Sinumerik",
-    ),
-}
+OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
+CONVERSATIONAL: Final = "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 
 def dialect_of(name: str, source: str) -> Dialect:
     """Return a dialect by its name; raises `NotUnderstoodError` where it is none that is read."""
     if name in DIALECTS:
         return DIALECTS[name]
-    if name in _NOT_READ:
-        raise not_read(name, source)
+    if name == "heidenhain":
+        raise input_error("dialect-unknown", CONVERSATIONAL, OTHER_POST, source=source)
     allowed = ", ".join(DIALECTS)
     raise input_error("dialect-unknown", f"dialect {name!r}; allowed: {allowed}", source=source)
-
-
-def not_read(name: str, source: str) -> NotUnderstoodError:
-    """Return the refusal of a language that is no G-code."""
-    what, remedy = _NOT_READ[name]
-    return input_error("dialect-unknown", what, remedy, source=source)

@@ -21,7 +21,8 @@ from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
-from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
+from gcode2krl.gcode.origin import control_of, refuse_foreign
+from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
 from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
@@ -42,7 +43,7 @@ from gcode2krl.gcode.state import (
     WORK_OFFSETS,
     initial_state,
 )
-from gcode2krl.gcode.text import pieces
+from gcode2krl.gcode.text import beginning, pieces
 from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools, tool_not_changed
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
@@ -58,6 +59,9 @@ _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
+
+_HEAD_BYTES, _MARKED_BYTES = 4000, 1_000_000
+"""So much of a program is looked through for marks of its control: of one that is read, of one that is refused."""
 
 Progress = Callable[[int], None]
 
@@ -107,7 +111,7 @@ def read_gcode(
     """
     name = str(path)
 
-    def read(as_dialect: str, hear: Progress | None) -> Toolpath:
+    def read(as_dialect: str, hear: Progress | None = None) -> Toolpath:
         try:
             with Path(path).open("rb") as stream:
                 return read_stream(
@@ -126,9 +130,15 @@ def read_gcode(
             raise input_error("file-unreadable", what, "check the path", source=name) from None
 
     try:
-        return read(dialect, progress)
+        toolpath = read(dialect, progress)
     except NotUnderstoodError as error:
-        raise with_other_dialects(error, dialect, lambda other: read(other, None)) from None
+        mark = control_of(beginning(path, name, _MARKED_BYTES))
+        raise with_other_control(error, mark, dialect, read) from None
+    if dialect != DEFAULT:  # it was named: nobody knows better
+        return toolpath
+    mark = control_of(beginning(path, name, _HEAD_BYTES))
+    doubts = tuple(doubts_of_control(toolpath, mark, dialect, read))
+    return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
 
 def read_stream(
@@ -198,7 +208,7 @@ def _interpreted(
         if not interpreter.ended:
             if not head:
                 head = text[:4000]
-                refuse_other_languages(head, name)
+                refuse_foreign(text, name)
             stopped_at = interpreter.feed(words, text, first_line, size)
             if stopped_at is not None:
                 # a jump may lead back to a line that has run, as far as it is in this piece

@@ -14,6 +14,7 @@ STRICTER_HERE = frozenset(
         "unit-doubtful",
         "cut-off",
         "offset-from-unknown",
+        "other-dialect",
         "parameter-unset",
         "tool-length-differs",
         "tool-not-changed",
