@@ -81,7 +81,8 @@ _MARKS: Final = (
         _FANUC,
         _pattern(
             r"\b(?:G0?5\.1 *Q|G187|G103 *P|G154 *P|G54\.1 *P|G68\.[2-4]|G5[01]\.1|G40\.1|G41\.2|G13\.1)\d*",
-            r"\b(?:GOTO *[#\d]|WHILE *\[[^\n]*\] *DO *\d|IF *\[[^\n]*\] *(?:GOTO|THEN)|G65 *P|G66 *P|M97 *P)\d*",
+            r"\b(?:GOTO *[#\d]|WHILE *\[[^\n]*\] *DO *\d|IF *\[[^\n]*\] *(?:GOTO|THEN))\d*",
+            r"\b(?:G6[56]|M97) *P\d*",
             r", *[RC] *-?[\d.]+",
         ),
     ),
@@ -104,29 +105,28 @@ _FOREIGN: Final = (
         "dialect-unknown",
         CONVERSATIONAL,
         OTHER_POST,
-        re.compile(
-            rb"\A[\s%]*\d*\s*BEGIN\s+PGM\b|^\s*\d*\s*(?:L|CC|C|CR)\s+[XY][+-]\d.*\bR[0LR]\b", re.M
-        ),
+        re.compile(rb"\A[\s%]*\d*\s*BEGIN\s+PGM\b|^\s*\d*\s*(?:L|CC|C|CR)\s+[XY][+-]\d.*\bR[0LR]\b", re.M),
         in_comments=True,
     ),
     _Foreign(
         "dialect-unknown",
-        "this is DIN/ISO of a Heidenhain (each block ends with *), whose codes mean other things: G30 and G31 "
-        "are the raw part, G99 is a tool",
+        "this is DIN/ISO of a Heidenhain (each block ends with *), whose codes mean other things: G30 and "
+        "G31 are the raw part, G99 is a tool",
         OTHER_POST,
         re.compile(rb"\A\s*%[^\s*]+\s+G7[01]\s*\*|(?:^[^\n*]*[^\s*\d][^\n*]*\*[ \t\r]*\n){3}", _FLAGS),
         unless=re.compile(rb"\*\d", _FLAGS),
     ),
     _Foreign(
         "dialect-unknown",
-        "this is a program for an Okuma (OSP), where G15 H selects the zero, G56 H the length of the tool and "
-        "G71 or VC set what they do nowhere else",
+        "this is a program for an Okuma (OSP), where G15 H selects the zero, G56 H the length of the tool "
+        "and G71 or VC set what they do nowhere else",
         OTHER_POST,
         _pattern(r"\A\s*\$[^\n%]*%", r"\bG15 *H *\d", r"\bG56 *H[A-Z]\b", r"\bVC\d+ *=", r"\bCALL +O[A-Z]"),
     ),
     _Foreign(
         "dialect-unknown",
-        "this is a program for a Philips or Heidenhain MillPlus (%PM), where G77, G83 and G98 mean other things",
+        "this is a program for a Philips or Heidenhain MillPlus (%PM), where G77, G83 and G98 mean "
+        "other things",
         OTHER_POST,
         _pattern(r"\A\s*%(?:PM|MM)\d*\b"),
     ),
@@ -135,7 +135,10 @@ _FOREIGN: Final = (
         "a slicer made this for a 3D printer: E drives an extruder, M104 and M109 heat it",
         _MILLING,
         _pattern(
-            r"^ *M(?:104|109|140|190) +S\d", r"^ *G92 +E0", r"^ *M8[23] *$", r"(?:^ *G1\b[^\n]*\bE *-?\.?\d[^\n]*\n(?:[^\n]*\n)?){2}"
+            r"^ *M(?:104|109|140|190) +S\d",
+            r"^ *G92 +E0",
+            r"^ *M8[23] *$",
+            r"(?:^ *G1\b[^\n]*\bE *-?\.?\d[^\n]*\n(?:[^\n]*\n)?){2}",
         ),
     ),
     _Foreign(
@@ -154,11 +157,12 @@ _FOREIGN: Final = (
     ),
     _Foreign(
         "not-a-part",
-        "this is a program for a lathe: T0101 is a tool with its offset, X is a diameter, U and W are X and Z "
-        "in increments",
+        "this is a program for a lathe: T0101 is a tool with its offset, X is a diameter, U and W are X "
+        "and Z in increments",
         _MILLING,
         re.compile(
-            rb"^ *(?:N\d+ *)?(?:G\d+ *)*T\d{4}\b(?:.|\n)*(?:\b[UW] *-?\d*\.?\d|\bG96\b|\bG50 *S|\bG99\b|\bG7[0-6] *[PUR])"
+            rb"^ *(?:N\d+ *)?(?:G\d+ *)*T\d{4}\b"
+            rb"(?:.|\n)*(?:\b[UW] *-?\d*\.?\d|\bG96\b|\bG50 *S|\bG99\b|\bG7[0-6] *[PUR])"
             rb"|^ *DIAMON\b|\bLIMS *=|\bCYCLE95\b",
             _FLAGS,
         ),
@@ -214,9 +218,10 @@ _FOREIGN: Final = (
 )
 """What is no milling program of a control that is read: one sentence each."""
 _CAM: Final = re.compile(
-    rb"\b(Fusion(?: 360)?|HSMWorks|Mastercam|MCAM|FreeCAD|Vectric|VCarve|Aspire|SolidCAM|CamBam|Estlcam|FlatCAM"
-    rb"|pcb2gcode|PyCAM|gcodetools|dxf2gcode|BlenderCAM|Fabex CNC|Kiri:Moto|SheetCam|bCNC|Carbide Create|Easel"
-    rb"|LightBurn|PowerMill|hyperMILL|Siemens NX|NX|CATIA|Edgecam|BobCAD|SprutCAM|ESPRIT|GibbsCAM|Alphacam)\b",
+    rb"\b(Fusion(?: 360)?|HSMWorks|Mastercam|MCAM|FreeCAD|Vectric|VCarve|Aspire|SolidCAM|CamBam|Estlcam"
+    rb"|FlatCAM|pcb2gcode|PyCAM|gcodetools|dxf2gcode|BlenderCAM|Fabex CNC|Kiri:Moto|SheetCam|bCNC"
+    rb"|Carbide Create|Easel|LightBurn|PowerMill|hyperMILL|Siemens NX|NX|CATIA|Edgecam|BobCAD|SprutCAM|ESPRIT"
+    rb"|GibbsCAM|Alphacam)\b",
     _FLAGS,
 )
 _CAM_PHRASES: Final = {b"using high feed g1": "Fusion 360", b"using g0 which travels": "Fusion 360"}

@@ -1,7 +1,7 @@
 """A program that has the marks of another control than that of the dialect: read in that one's dialect too.
 
-The advice to choose a dialect is given for marks alone (`origin`), and says what the other reading found. Where
-both read the program and mean the same, nothing is said.
+The advice to choose a dialect is given for marks alone (`origin`), and says what the other reading found.
+Where both read the program and mean the same, nothing is said.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,8 +33,10 @@ def with_other_control(
     if not ended:
         return error
     what = f"{_said(mark)}; it was read as {dialect}"
-    listed = f"; {'1 finding of that reading is' if ended == 1 else f'{ended} findings of that reading are'} not listed"
-    first = Issue("error", "other-dialect", mark.line, what + listed, _remedy(other, remaining))
+    listed = "; 1 finding of that reading is" if ended == 1 else f"; {ended} findings of that reading are"
+    first = Issue(
+        "error", "other-dialect", mark.line, what + listed + " not listed", _remedy(other, remaining)
+    )
     rest = [issue for issue in error.issues if issue.severity != "error" and issue.code not in _COUNTS]
     return NotUnderstoodError([first, *kept, *rest], error.source)
 
@@ -58,7 +60,8 @@ def doubts_of_control(toolpath: Toolpath, mark: Mark | None, dialect: str, rerea
         "other-dialect",
         line,
         f"{_said(mark)}, which does not mean here what {dialect} does: {what}",
-        f"{_remedy(other, remaining)}; or --allow other-dialect, if the control that runs it reads as {dialect} does",
+        f"{_remedy(other, remaining)}; or --allow other-dialect, if the control that runs it reads as "
+        f"{dialect} does",
     )
 
 
@@ -91,7 +94,10 @@ def _said(mark: Mark) -> str:
 
 def _remedy(dialect: str, remaining: tuple[Issue, ...]) -> str:
     if remaining and all(issue.code == _POINTLESS for issue in remaining):
-        return "--dialect fanuc-calculator where X100 is 100 mm on this control, fanuc-increments where it is 0.1 mm"
+        return (
+            "--dialect fanuc-calculator where X100 is 100 mm on this control, fanuc-increments where it is "
+            "0.1 mm"
+        )
     if not remaining:
         return f"--dialect {dialect} reads it"
     line, what = _first_refusal(remaining)
@@ -111,7 +117,7 @@ def _first_refusal(remaining: tuple[Issue, ...]) -> tuple[int, str]:
 
 
 def _difference(here: Toolpath, there: Toolpath) -> tuple[int, str] | None:
-    """Return line and sentence of the first row in which two readings of a program differ, None where none does."""
+    """Return line and sentence of the first row in which two readings differ, None where none does."""
     rows = min(len(here.position_mm), len(there.position_mm))
     a, b = slice(0, rows), slice(0, rows)
     columns = {

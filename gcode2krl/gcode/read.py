@@ -44,7 +44,13 @@ from gcode2krl.gcode.state import (
     initial_state,
 )
 from gcode2krl.gcode.text import beginning, pieces
-from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools, tool_not_changed
+from gcode2krl.gcode.tool_comments import (
+    NamedTool,
+    changes_in_comments,
+    named_tools,
+    other_tools,
+    tool_not_changed,
+)
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
@@ -61,7 +67,7 @@ _MOST_REST_BYTES = 8_000_000
 _MOST_ISSUES = 1000
 
 _HEAD_BYTES, _MARKED_BYTES = 4000, 1_000_000
-"""So much of a program is looked through for marks of its control: of one that is read, of one that is refused."""
+"""So much of a program is looked through for marks of its control: where it is read, where it is refused."""
 
 Progress = Callable[[int], None]
 
@@ -182,12 +188,11 @@ def read_stream(
         **_rotary_settings(cell),
     )
     with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
-        head, diameters = _interpreted(
-            interpreter, scanned, spoken, name, _size_of(stream), folders, progress
-        )
+        head, named = _interpreted(interpreter, scanned, spoken, name, _size_of(stream), folders, progress)
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
-        doubts += other_tools(diameters, toolpath, cell)
+        doubts += other_tools(named, toolpath, cell)
+        doubts += changes_in_comments(named, toolpath, cell)
         doubts += tool_not_changed(*interpreter.selected(), toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
@@ -200,10 +205,10 @@ def _interpreted(
     size: int,
     folders: Sequence[Path],
     progress: Progress | None,
-) -> tuple[bytes, list[NamedDiameter]]:
-    """Interpret a program; return how its text begins, and the diameters that its comments name."""
+) -> tuple[bytes, list[NamedTool]]:
+    """Interpret a program; return how its text begins, and the tools that its comments name."""
     head, rest_bytes = b"", 0
-    diameters: list[NamedDiameter] = []
+    named: list[NamedTool] = []
     for first_line, text, words in scanned:
         if not interpreter.ended:
             if not head:
@@ -217,14 +222,14 @@ def _interpreted(
                 whole = b"".join((rest, *(more for _, more, _ in scanned)))
                 interpreter.run_whole(whole, begin, stopped_at, folders)
                 break
-            diameters += named_diameters(text, first_line)
+            named += named_tools(text, first_line)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    return head, diameters
+    return head, named
 
 
 def _mounted_tool(cell: "Cell | None") -> int:

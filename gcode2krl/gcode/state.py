@@ -35,6 +35,7 @@ STATE = np.dtype(
         ("rpm", "f8"),
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
         ("tool", "i4"),
+        ("tool_stated", "i1"),  # by M6 or M61; before it the cell's mounted tool is in the spindle
         ("selected_tool", "i4"),  # -1 = none yet
         ("selected_line", "i4"),  # where it was named
         ("length_offset", "f8"),  # NaN = G49
@@ -113,7 +114,7 @@ STATE = np.dtype(
         ("cutter_rows_removed", "i8"),  # rows of held arcs that have been taken away again, in all
         ("held_events", "i8"),  # events before it
         ("retract", "i4"),  # ten times 98 or 99
-        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere, -1 = by the control at its start
+        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere, -1 = at the start
         ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
         ("unset_line", "i4"),  # where, 0 = nowhere
         ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99

@@ -6,6 +6,7 @@
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/settings.h"
+#include "gcode/tool_lengths.h"
 
 /* From this difference on the diameter is not that of the tool in the spindle. */
 static const double OTHER_DIAMETER_MM = 1e-6;
@@ -54,8 +55,8 @@ static double of_tool(Floats diameter_mm, int32_t tool) {
 
 /* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
 static double tool_diameter(Block *b, int32_t code) {
-    const State *s = b->state;
-    int32_t tool = s->tool;
+    const int32_t there = tool_in_spindle(b->machine);
+    int32_t tool = there;
     if (b->has[V_WORD_D]) {
         tool = whole(b->word[V_WORD_D]);
         if (tool == NOT_WHOLE) {
@@ -63,7 +64,7 @@ static double tool_diameter(Block *b, int32_t code) {
             return NAN;
         }
         if (tool == 0)
-            tool = s->tool;
+            tool = there;
     }
     const double diameter_mm = of_tool(b->machine->tool_diameter_mm, tool);
     if (tool == 0)
@@ -84,7 +85,7 @@ static double diameter(Block *b, int32_t code) {
 
 /* Warn where the diameter is not that with which the tool in the spindle cuts. */
 static void compare_with_tool(Block *b, int32_t code, double diameter_mm) {
-    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, b->state->tool);
+    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, tool_in_spindle(b->machine));
     if (fabs(diameter_mm - in_cell_mm) > OTHER_DIAMETER_MM)
         report(b, F_CUTTER_DIFFERS, (Says){.a = code, .b = diameter_mm, .c = in_cell_mm});
 }

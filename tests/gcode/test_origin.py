@@ -1,4 +1,4 @@
-"""Who wrote a file: foreign ones get one sentence; a control is named by its own marks, and read both ways."""
+"""Who wrote a file: foreign ones get one sentence; a control is named by its marks, and read both ways."""
 
 import io
 
@@ -9,7 +9,9 @@ from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.origin import cam_of, control_of
 
-MILL = "G21 G17 G90 G94 G40 G49 G80\nG54\nT1 M6\nS8000 M3\nG43 H1 G0 Z30.\nG0 X0. Y0.\nG0 Z2.\nG1 Z-1. F300.\n"
+MILL = (
+    "G21 G17 G90 G94 G40 G49 G80\nG54\nT1 M6\nS8000 M3\nG43 H1 G0 Z30.\nG0 X0. Y0.\nG0 Z2.\nG1 Z-1. F300.\n"
+)
 END = "G0 Z30.\nM5\nM30\n"
 FOREIGN = {
     "Okuma": "$SHAFT.MIN%\nO7\nG15 H2\nG0 X0 Y0\nG56 HA Z40\nG1 X5 F100\nM2\n",
@@ -90,7 +92,9 @@ def test_a_control_is_named_by_its_own_marks(text, title, line):
     assert mark.line == line
 
 
-@pytest.mark.parametrize("text", [MILL + END, "%\n(1001)\n" + MILL + END + "%\n", "G0 X1 (O0001, G187)\nM2\n"])
+@pytest.mark.parametrize(
+    "text", [MILL + END, "%\n(1001)\n" + MILL + END + "%\n", "G0 X1 (O0001, G187)\nM2\n"]
+)
 def test_what_any_control_writes_names_none(text):
     assert control_of(text.encode()) is None
 
