@@ -594,6 +594,7 @@
 #define S_NOTE_TABLE 6
 #define S_NOTE_CODE 7
 #define S_NOTE_STATEMENT 8
+#define S_NOTE_SMALL_ARC 9
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -951,9 +952,9 @@ typedef struct {
     int32_t distance_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[9];
-    int32_t note_line[9];
-    int32_t note_word[9];
+    int32_t note_count[10];
+    int32_t note_line[10];
+    int32_t note_word[10];
     double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
@@ -969,6 +970,7 @@ typedef struct {
     int32_t cutter_code;
     int32_t cutter_line;
     double cutter_radius_mm;
+    double cutter_other_mm[2];
     int8_t cutter_entered;
     int8_t cutter_failed;
     double cutter_normal[2];
@@ -1065,53 +1067,54 @@ typedef char State_distance_line_stands_at_496[offsetof(State, distance_line) ==
 typedef char State_feed_mode_line_stands_at_500[offsetof(State, feed_mode_line) == 500 ? 1 : -1];
 typedef char State_rotary_refused_stands_at_504[offsetof(State, rotary_refused) == 504 ? 1 : -1];
 typedef char State_note_count_stands_at_508[offsetof(State, note_count) == 508 ? 1 : -1];
-typedef char State_note_line_stands_at_544[offsetof(State, note_line) == 544 ? 1 : -1];
-typedef char State_note_word_stands_at_580[offsetof(State, note_word) == 580 ? 1 : -1];
-typedef char State_moved_mm_stands_at_616[offsetof(State, moved_mm) == 616 ? 1 : -1];
-typedef char State_misfits_stands_at_688[offsetof(State, misfits) == 688 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_692[offsetof(State, misfits_other_centre) == 692 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_696[offsetof(State, misfits_reversed) == 696 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_700[offsetof(State, misfits_exchanged) == 700 ? 1 : -1];
-typedef char State_spirals_stands_at_704[offsetof(State, spirals) == 704 ? 1 : -1];
-typedef char State_spiral_line_stands_at_708[offsetof(State, spiral_line) == 708 ? 1 : -1];
-typedef char State_spiral_start_stands_at_712[offsetof(State, spiral_start) == 712 ? 1 : -1];
-typedef char State_spiral_end_stands_at_720[offsetof(State, spiral_end) == 720 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_728[offsetof(State, spiral_unit_mm) == 728 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_736[offsetof(State, cutter_mode) == 736 ? 1 : -1];
-typedef char State_cutter_side_stands_at_740[offsetof(State, cutter_side) == 740 ? 1 : -1];
-typedef char State_cutter_code_stands_at_744[offsetof(State, cutter_code) == 744 ? 1 : -1];
-typedef char State_cutter_line_stands_at_748[offsetof(State, cutter_line) == 748 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_752[offsetof(State, cutter_radius_mm) == 752 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_760[offsetof(State, cutter_entered) == 760 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_761[offsetof(State, cutter_failed) == 761 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_768[offsetof(State, cutter_normal) == 768 ? 1 : -1];
-typedef char State_held_turn_stands_at_784[offsetof(State, held_turn) == 784 ? 1 : -1];
-typedef char State_held_line_stands_at_788[offsetof(State, held_line) == 788 ? 1 : -1];
-typedef char State_held_from_stands_at_792[offsetof(State, held_from) == 792 ? 1 : -1];
-typedef char State_held_along_stands_at_808[offsetof(State, held_along) == 808 ? 1 : -1];
-typedef char State_held_centre_stands_at_824[offsetof(State, held_centre) == 824 ? 1 : -1];
-typedef char State_held_w_stands_at_840[offsetof(State, held_w) == 840 ? 1 : -1];
-typedef char State_held_sweep_stands_at_856[offsetof(State, held_sweep) == 856 ? 1 : -1];
-typedef char State_held_rows_stands_at_864[offsetof(State, held_rows) == 864 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_880[offsetof(State, cutter_rows_removed) == 880 ? 1 : -1];
-typedef char State_held_events_stands_at_888[offsetof(State, held_events) == 888 ? 1 : -1];
-typedef char State_retract_stands_at_896[offsetof(State, retract) == 896 ? 1 : -1];
-typedef char State_retract_line_stands_at_900[offsetof(State, retract_line) == 900 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_904[offsetof(State, unset_parameter) == 904 ? 1 : -1];
-typedef char State_unset_line_stands_at_908[offsetof(State, unset_line) == 908 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_912[offsetof(State, retract_unnamed_line) == 912 ? 1 : -1];
-typedef char State_in_cycles_stands_at_916[offsetof(State, in_cycles) == 916 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_920[offsetof(State, cycle_level_mm) == 920 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_928[offsetof(State, cycle_level_known) == 928 ? 1 : -1];
-typedef char State_cycle_r_stands_at_936[offsetof(State, cycle_r) == 936 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_944[offsetof(State, cycle_depth) == 944 ? 1 : -1];
-typedef char State_cycle_q_stands_at_952[offsetof(State, cycle_q) == 952 ? 1 : -1];
-typedef char State_cycle_p_stands_at_960[offsetof(State, cycle_p) == 960 ? 1 : -1];
-typedef char State_cycle_line_stands_at_968[offsetof(State, cycle_line) == 968 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_972[offsetof(State, cycle_plane) == 972 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_976[offsetof(State, cycle_unit_mm) == 976 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_984[offsetof(State, cycle_absolute) == 984 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 992 ? 1 : -1];
+typedef char State_note_line_stands_at_548[offsetof(State, note_line) == 548 ? 1 : -1];
+typedef char State_note_word_stands_at_588[offsetof(State, note_word) == 588 ? 1 : -1];
+typedef char State_moved_mm_stands_at_632[offsetof(State, moved_mm) == 632 ? 1 : -1];
+typedef char State_misfits_stands_at_704[offsetof(State, misfits) == 704 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_708[offsetof(State, misfits_other_centre) == 708 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_712[offsetof(State, misfits_reversed) == 712 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_716[offsetof(State, misfits_exchanged) == 716 ? 1 : -1];
+typedef char State_spirals_stands_at_720[offsetof(State, spirals) == 720 ? 1 : -1];
+typedef char State_spiral_line_stands_at_724[offsetof(State, spiral_line) == 724 ? 1 : -1];
+typedef char State_spiral_start_stands_at_728[offsetof(State, spiral_start) == 728 ? 1 : -1];
+typedef char State_spiral_end_stands_at_736[offsetof(State, spiral_end) == 736 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_744[offsetof(State, spiral_unit_mm) == 744 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_752[offsetof(State, cutter_mode) == 752 ? 1 : -1];
+typedef char State_cutter_side_stands_at_756[offsetof(State, cutter_side) == 756 ? 1 : -1];
+typedef char State_cutter_code_stands_at_760[offsetof(State, cutter_code) == 760 ? 1 : -1];
+typedef char State_cutter_line_stands_at_764[offsetof(State, cutter_line) == 764 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_768[offsetof(State, cutter_radius_mm) == 768 ? 1 : -1];
+typedef char State_cutter_other_mm_stands_at_776[offsetof(State, cutter_other_mm) == 776 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_792[offsetof(State, cutter_entered) == 792 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_793[offsetof(State, cutter_failed) == 793 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_800[offsetof(State, cutter_normal) == 800 ? 1 : -1];
+typedef char State_held_turn_stands_at_816[offsetof(State, held_turn) == 816 ? 1 : -1];
+typedef char State_held_line_stands_at_820[offsetof(State, held_line) == 820 ? 1 : -1];
+typedef char State_held_from_stands_at_824[offsetof(State, held_from) == 824 ? 1 : -1];
+typedef char State_held_along_stands_at_840[offsetof(State, held_along) == 840 ? 1 : -1];
+typedef char State_held_centre_stands_at_856[offsetof(State, held_centre) == 856 ? 1 : -1];
+typedef char State_held_w_stands_at_872[offsetof(State, held_w) == 872 ? 1 : -1];
+typedef char State_held_sweep_stands_at_888[offsetof(State, held_sweep) == 888 ? 1 : -1];
+typedef char State_held_rows_stands_at_896[offsetof(State, held_rows) == 896 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_912[offsetof(State, cutter_rows_removed) == 912 ? 1 : -1];
+typedef char State_held_events_stands_at_920[offsetof(State, held_events) == 920 ? 1 : -1];
+typedef char State_retract_stands_at_928[offsetof(State, retract) == 928 ? 1 : -1];
+typedef char State_retract_line_stands_at_932[offsetof(State, retract_line) == 932 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_936[offsetof(State, unset_parameter) == 936 ? 1 : -1];
+typedef char State_unset_line_stands_at_940[offsetof(State, unset_line) == 940 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_944[offsetof(State, retract_unnamed_line) == 944 ? 1 : -1];
+typedef char State_in_cycles_stands_at_948[offsetof(State, in_cycles) == 948 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_952[offsetof(State, cycle_level_mm) == 952 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_960[offsetof(State, cycle_level_known) == 960 ? 1 : -1];
+typedef char State_cycle_r_stands_at_968[offsetof(State, cycle_r) == 968 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_976[offsetof(State, cycle_depth) == 976 ? 1 : -1];
+typedef char State_cycle_q_stands_at_984[offsetof(State, cycle_q) == 984 ? 1 : -1];
+typedef char State_cycle_p_stands_at_992[offsetof(State, cycle_p) == 992 ? 1 : -1];
+typedef char State_cycle_line_stands_at_1000[offsetof(State, cycle_line) == 1000 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_1004[offsetof(State, cycle_plane) == 1004 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_1008[offsetof(State, cycle_unit_mm) == 1008 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_1016[offsetof(State, cycle_absolute) == 1016 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1024 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

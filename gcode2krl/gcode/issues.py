@@ -22,6 +22,7 @@ from gcode2krl.gcode.state import (
     NOTE_HOME,
     NOTE_OVERRIDE,
     NOTE_ROTARY,
+    NOTE_SMALL_ARC,
     NOTE_STATEMENT,
 )
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
@@ -54,6 +55,11 @@ _NOTES = {
         "override-switch",
         "M{number} switches overrides, which have no meaning on this robot; not read ({blocks})",
         "nothing to do; the override stands on the robot's panel",
+    ),
+    NOTE_SMALL_ARC: (
+        "arc-small",
+        "an arc that is smaller as a whole than the chord tolerance is read as a straight move ({blocks})",
+        "nothing to do; a post that leaves such arcs out makes shorter programs",
     ),
     NOTE_CODE: (
         "dialect-harmless",

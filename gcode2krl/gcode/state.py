@@ -82,9 +82,9 @@ STATE = np.dtype(
         ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
-        ("note_count", "i4", 9),  # blocks with something harmless, by NOTE_…
-        ("note_line", "i4", 9),  # the first of them
-        ("note_word", "i4", 9),
+        ("note_count", "i4", 10),  # blocks with something harmless, by NOTE_…
+        ("note_line", "i4", 10),  # the first of them
+        ("note_word", "i4", 10),
         ("moved_mm", "f8", 9),  # how far the first of each of NOTE_LOCAL, … moves the zero
         ("misfits", "i4"),  # arcs whose radii differ too much
         ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
@@ -100,6 +100,7 @@ STATE = np.dtype(
         ("cutter_code", "i4"),  # ten times the number of the G-code in force
         ("cutter_line", "i4"),  # where it stands
         ("cutter_radius_mm", "f8"),
+        ("cutter_other_mm", "f8", 2),  # diameters of G41 and of the tool that cuts, until it is told; else 0
         ("cutter_entered", "i1"),  # the entry move has been made
         ("cutter_failed", "i1"),  # a corner has been reported: further ones are consequences
         ("cutter_normal", "f8", 2),  # in the plane, from the programmed point (x, y, z) to the tool
@@ -171,7 +172,7 @@ DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SP
 DOUBT_POSITION = DOUBT_X | DOUBT_Y | DOUBT_Z
 DOUBT_ALL = (1 << 12) - 1
 NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_LOCAL, NOTE_SHIFT, NOTE_TABLE = range(7)
-NOTE_CODE, NOTE_STATEMENT = 7, 8
+NOTE_CODE, NOTE_STATEMENT, NOTE_SMALL_ARC = 7, 8, 9
 
 
 def initial_state() -> NDArray[np.void]:

@@ -9,6 +9,7 @@
 
 #include "gcode/block_words.h"
 #include "gcode/compensate.h"
+#include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/offsets.h"
@@ -242,6 +243,8 @@ static bool execute(Block *b) {
             use_vector(b);
         if (is_cycle(b->state->motion) && !may_cycle(b))
             return true;
+        if (b->state->cutter_mode & S_CUTTER_ON)
+            tell_other_diameter(b);
         if (!move(b))
             return false;
     }

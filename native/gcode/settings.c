@@ -2,6 +2,7 @@
 
 #include "gcode/settings.h"
 
+#include "gcode/compensate.h"
 #include "gcode/cutter_settings.h"
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
@@ -86,6 +87,7 @@ static void change_tool(Block *b) {
         s->direction = 0;
         event(b, S_EVENT_SPINDLE, 0.0, S_IMPLIED_M5);
     }
+    stand_beside(s);
     s->tool = s->selected_tool;
     s->tool_stated = 1;
     event(b, S_EVENT_TOOL, s->tool, 0.0);
