@@ -169,7 +169,8 @@ def test_a_machine_with_rotary_axes_that_stand_changes_nothing(tmp_path):
 
 def test_a_tool_change_behind_g40_goes_on_from_where_the_tool_stands():
     """As LinuxCNC: Z alone then moves along the tool, and does not lead back to the contour."""
-    text = "G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41 D1\nG1 X20 Y0 F500\nX50\nG40\n{}G0 Z30\nG1 X60 Y20\nM2\n"
+    head = "G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41 D1\nG1 X20 Y0 F500\nX50\nG40\n"
+    text = head + "{}G0 Z30\nG1 X60 Y20\nM2\n"
     changed = read_stream(io.BytesIO(text.format("T1 M6\nG43 H1\n").encode()), "part.nc", load_cell())
     assert changed.position_mm[-2:].tolist() == [[50.0, 8.0, 30.0], [60.0, 20.0, 30.0]]
     kept = read_stream(io.BytesIO(text.format("").encode()), "part.nc", load_cell())

@@ -338,7 +338,8 @@ def test_little_room_changes_nothing(monkeypatch):
 @pytest.mark.parametrize("label", ["<inner>", "<deep>", "100"])
 def test_a_return_leaves_its_subprogram_from_within_whatever_its_label_is(opening, closing, label):
     """As LinuxCNC, which does not look at the label of a return."""
-    sub = f"o<deep> sub\no<inner> {opening}\nG1 X[#1]\no{label} return\no<inner> {closing}\nG1 X99\no<deep> endsub\n"
+    inside = f"o<inner> {opening}\nG1 X[#1]\no{label} return\no<inner> {closing}\n"
+    sub = f"o<deep> sub\n{inside}G1 X99\no<deep> endsub\n"
     text = f"{sub}G21 G90\nG0 X0 Y0 Z0\nF500\no<deep> call [3]\no<deep> call [4]\nG1 Y7\nM2\n"
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
     assert toolpath.position_mm[-3:].tolist() == [[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 7.0, 0.0]]
