@@ -92,6 +92,18 @@ REASONS: Final = (
         "; ends a block on this control, and a word stands behind it",
         "write a comment in ( ), a block in a line of its own",
     ),
+    (
+        "the control would round or chamfer the corner to the next block",
+        "let the post write the corner as G1, G2 and G3",
+    ),
+    (
+        "0 repeats store the cycle and drill nothing, and whether the tool goes to X and Y is not sure",
+        "write the cycle in the block of its first hole, without L0 and K0",
+    ),
+    (
+        "G10 is read as G10 L2 P1 to P6 with X, Y and Z, under G90 alone",
+        "write it so, or remove the block and state offsets in [work_offsets] and [tool.N] of the cell",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -104,6 +116,7 @@ _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
 REASON_NO_TIP, REASON_VECTOR_AND_ANGLE, REASON_VECTOR_ARC, REASON_OTHER_TIP = range(34, 38)
 REASON_SHIFT_AND_TIP, REASON_ZERO_AND_TIP, REASON_FEED_AXES = range(38, 41)
 REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
+REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -231,7 +244,7 @@ _FANUC_REFUSED = {
     _RETURN: (29,),
     _HOME: (27,),
     _SETTING: (22,),
-    _NUMBERS: (10, 11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
+    _NUMBERS: (11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
     _LEAD: (41, 41.1, 42, 42.1),
     _CYCLE: (70, 71, 72, 75, 77, 78, 79),
 }
@@ -289,6 +302,7 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
     _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
+    _kind(d.REFUSED, REASON_CORNER): ("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM"),
     _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),

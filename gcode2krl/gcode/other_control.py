@@ -55,13 +55,13 @@ def doubts_of_control(toolpath: Toolpath, mark: Mark | None, dialect: str, rerea
     if difference is None:
         return
     line, what = difference
+    remedy = remaining[0].remedy if remaining else _remedy(other, remaining)
     yield Issue(
         "warning",
         "other-dialect",
         line,
         f"{_said(mark)}, which does not mean here what {dialect} does: {what}",
-        f"{_remedy(other, remaining)}; or --allow other-dialect, if the control that runs it reads as "
-        f"{dialect} does",
+        f"{remedy}; or --allow other-dialect, if the control that runs it reads as {dialect} does",
     )
 
 

@@ -285,7 +285,19 @@ def test_programs_that_compute_or_jump_are_not_of_every_dialect(dialect, line):
 @pytest.mark.parametrize(
     "line",
     [
-        *("G4 P1.5", "G4 P500 X1.", "G10 L2 P1 X0.", "G92 X0. Y0.", "G41 D1", "G43.1 Z1.", "G59.1"),
+        *(
+            "G4 P1.5",
+            "G4 P500 X1.",
+            "G10 L2 P0 X0.",
+            "G10 L2 P7 X0.",
+            "G91 G10 L2 P1 X1.",
+            "G10 L10 P1 R5.",
+            "G10 L2 P1 R5.",
+            "G92 X0. Y0.",
+            "G41 D1",
+            "G43.1 Z1.",
+            "G59.1",
+        ),
         *("G95\nG1 X1. F20", "G93\nG1 X1. F20", "G20\nG1 X1. F10", "G82 X1. Z-1. R1. P0.5 F100"),
         "G83 X1. Z-1. R1. Q2000 F100",
     ],
@@ -299,3 +311,35 @@ def test_times_and_angles_have_their_own_increments():
     inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
     assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
     assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
+def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
+    text = "G21 G90\nG10 L2 P2 X10. Y-5. Z1.\nG55\nG0 X1. Y1. Z1.\nM30\n"
+    assert read(text, dialect).position_mm[-1].tolist() == [11.0, -4.0, 2.0]
+    assert "program-offset" not in {i.code for i in read(text, dialect).issues if i.severity == "error"}
+
+
+@pytest.mark.parametrize(
+    ("line", "dialect", "reason"),
+    [
+        ("G1 X5. ,R2. F100", "fanuc", "corner"),
+        ("G1 X5. , C1. F100", "fanuc-calculator", "corner"),
+        ("G1 X5 RND=2 F100", "sinumerik", "corner"),
+        ("G1 X5 CHF=1 F100", "sinumerik", "corner"),
+        ("G1 X5 CHR=1 F100", "sinumerik", "corner"),
+        ("G83 X5. Z-5. R1. Q2. F100 L0", "fanuc", "drill nothing"),
+        ("G81 X5. Z-5. R1. F100 K0", "fanuc", "drill nothing"),
+        ("G10 L10 P1 R5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G10 L2 P0 X5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G41 D1 G1 X5. F100", "fanuc", "leads in"),
+        ("MCALL CYCLE81(10,0,2,-8)", "sinumerik", "cycle"),
+        ('T="MILL" D1', "sinumerik", "tool by its name"),
+    ],
+)
+def test_what_is_not_carried_out_is_refused_with_its_own_reason(line, dialect, reason):
+    unit = "G710" if dialect == "sinumerik" else "G21"
+    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
+    assert [i.line for i in found] == [3]
+    assert reason in found[0].message
+    assert "--dialect" not in found[0].remedy
