@@ -953,6 +953,7 @@ typedef struct {
     int32_t doubt;
     int32_t motion_line;
     int32_t distance_line;
+    int32_t distance_unnamed_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
     int32_t note_count[10];
@@ -1067,11 +1068,12 @@ typedef char State_unknown_reported_stands_at_484[offsetof(State, unknown_report
 typedef char State_doubt_stands_at_488[offsetof(State, doubt) == 488 ? 1 : -1];
 typedef char State_motion_line_stands_at_492[offsetof(State, motion_line) == 492 ? 1 : -1];
 typedef char State_distance_line_stands_at_496[offsetof(State, distance_line) == 496 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_500[offsetof(State, feed_mode_line) == 500 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_504[offsetof(State, rotary_refused) == 504 ? 1 : -1];
-typedef char State_note_count_stands_at_508[offsetof(State, note_count) == 508 ? 1 : -1];
-typedef char State_note_line_stands_at_548[offsetof(State, note_line) == 548 ? 1 : -1];
-typedef char State_note_word_stands_at_588[offsetof(State, note_word) == 588 ? 1 : -1];
+typedef char State_distance_unnamed_line_stands_at_500[offsetof(State, distance_unnamed_line) == 500 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_504[offsetof(State, feed_mode_line) == 504 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_508[offsetof(State, rotary_refused) == 508 ? 1 : -1];
+typedef char State_note_count_stands_at_512[offsetof(State, note_count) == 512 ? 1 : -1];
+typedef char State_note_line_stands_at_552[offsetof(State, note_line) == 552 ? 1 : -1];
+typedef char State_note_word_stands_at_592[offsetof(State, note_word) == 592 ? 1 : -1];
 typedef char State_moved_mm_stands_at_632[offsetof(State, moved_mm) == 632 ? 1 : -1];
 typedef char State_misfits_stands_at_704[offsetof(State, misfits) == 704 ? 1 : -1];
 typedef char State_misfits_other_centre_stands_at_708[offsetof(State, misfits_other_centre) == 708 ? 1 : -1];

@@ -161,6 +161,14 @@ def program_issues(
         yield _unset(int(state["unset_line"]), int(state["unset_parameter"]), programs)
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
+    if state["distance_unnamed_line"]:
+        yield Issue(
+            "warning",
+            "start-unnamed",
+            int(state["distance_unnamed_line"]),
+            "a move before G90 or G91: with which of them a Fanuc starts is a parameter; read under G90",
+            "write G90 before it; or --allow start-unnamed where the control starts with G90, as a Haas does",
+        )
     if not state["ended"]:
         yield _no_end(cut_off=state["tape_marks"] == 1)
     if rest_line:

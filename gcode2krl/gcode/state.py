@@ -80,6 +80,7 @@ STATE = np.dtype(
         ("doubt", "i4"),  # bits of what a block that was not understood may have set
         ("motion_line", "i4"),  # where the motion mode was named, 0 = nowhere
         ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
+        ("distance_unnamed_line", "i4"),  # first move of a Fanuc before G90 or G91, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
         ("note_count", "i4", 10),  # blocks with something harmless, by NOTE_…

@@ -16,6 +16,7 @@ STRICTER_HERE = frozenset(
         "offset-from-unknown",
         "other-dialect",
         "parameter-unset",
+        "start-unnamed",
         "tool-length-differs",
         "tool-not-changed",
     }

@@ -203,12 +203,13 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
     return true;
 }
 
-/* Tell whether an arc is smaller as a whole than its chords may be off. */
+/* Tell whether an arc that LinuxCNC refuses as one of radius zero is smaller as a whole than its chords may be off. */
 static bool is_small(const Block *b, const Arc *arc) {
     const State *s = b->state;
     const double size_mm = 2.0 * greater(arc->from_radius_mm, arc->to_radius_mm);
     const bool plain = s->feed_mode != V_INVERSE_TIME && !compensates(s) && !b->machine->rotary_axes;
-    return plain && size_mm > 0.0 && size_mm <= b->machine->chord_tolerance_mm;
+    const bool refused = lesser(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM;
+    return plain && refused && size_mm > 0.0 && size_mm <= b->machine->chord_tolerance_mm;
 }
 
 /* Write such an arc as a straight move to its end; return false where there is no room for it. */

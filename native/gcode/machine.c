@@ -234,6 +234,9 @@ static bool execute(Block *b) {
         return true;
     }
     if (moves) {
+        const bool by_parameter = b->machine->programs == D_PROGRAMS_FANUC && b->state->distance_line == 0;
+        if (by_parameter && b->state->distance_unnamed_line == 0)
+            b->state->distance_unnamed_line = b->line;
         use_axes(b);
         if (is_arc(b->state->motion))
             use_arc_words(b);

@@ -343,3 +343,13 @@ def test_what_is_not_carried_out_is_refused_with_its_own_reason(line, dialect, r
     assert [i.line for i in found] == [3]
     assert reason in found[0].message
     assert "--dialect" not in found[0].remedy
+
+
+def test_a_fanuc_program_that_leaves_g90_to_the_control_is_told():
+    def lines(text, dialect):
+        return [i.line for i in read(text, dialect).issues if i.code == "start-unnamed"]
+
+    assert lines("G21\nG0 X1. Y1. Z1.\nG90\nM30\n", "fanuc") == [2]
+    assert lines("G21 G90\nG0 X1. Y1. Z1.\nM30\n", "fanuc") == []
+    assert lines("G21\nG91 G28 Z0.\nG90 G0 X1. Y1. Z1.\nM30\n", "fanuc") == []
+    assert lines("G21\nG0 X1. Y1. Z1.\nM30\n", "linuxcnc") == []

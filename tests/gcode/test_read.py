@@ -210,7 +210,7 @@ def test_a_refused_program_leaves_no_thread_behind():
 
 
 @pytest.mark.parametrize(
-    "arc", ["G2 X0.001 Y-7.5 I-0.001 J0", "G3 X0.002 Y-7.5 R0.002", "G2 X0.001 Y-7.5 Z3 I-0.001"]
+    "arc", ["G2 X0.001 Y-7.5 I-0.001 J0", "G3 X0.002 Y-7.5 R0.0008", "G2 X0.001 Y-7.5 Z3 I-0.001"]
 )
 def test_an_arc_below_the_chord_tolerance_is_a_straight_move_with_a_note(arc):
     text = f"G21 G90\nG0 X0.001 Y-7.5 Z5\n{arc} F600\nG1 X20\nM2\n"
@@ -222,6 +222,6 @@ def test_an_arc_below_the_chord_tolerance_is_a_straight_move_with_a_note(arc):
 
 
 def test_a_larger_arc_is_never_flattened():
-    text = "G21 G90\nG0 X0.006 Y0 Z5\nG2 X0.006 Y0 I-0.006 F600\nM2\n"
+    text = "G21 G90\nG0 X0.002 Y0 Z5\nG2 X0.002 Y0 I-0.002 F600\nM2\n"
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
     assert not [i for i in toolpath.issues if i.code == "arc-small"]
