@@ -333,6 +333,9 @@
 #define DR_REASON_FEED_AXES 40
 #define DR_REASON_PARENTHESES 41
 #define DR_REASON_SEMICOLON 42
+#define DR_REASON_CORNER 43
+#define DR_REASON_STORED 44
+#define DR_REASON_G10 45
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -344,6 +347,8 @@
 #define DR_REASON_TWICE 28
 #define DR_REASON_MOVED 29
 #define DR_DEFAULT "linuxcnc"
+#define DR_OTHER_POST "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
+#define DR_CONVERSATIONAL "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 /* gcode2krl.gcode.findings */
 #define F_OK 0
@@ -515,6 +520,7 @@
 #define S_NOTE_TABLE 6
 #define S_NOTE_CODE 7
 #define S_NOTE_STATEMENT 8
+#define S_NOTE_SMALL_ARC 9
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_EVENT_TOOL 0
@@ -826,6 +832,7 @@ typedef struct {
     double rpm;
     int32_t direction;
     int32_t tool;
+    int8_t tool_stated;
     int32_t selected_tool;
     int32_t selected_line;
     double length_offset;
@@ -870,11 +877,12 @@ typedef struct {
     int32_t doubt;
     int32_t motion_line;
     int32_t distance_line;
+    int32_t distance_unnamed_line;
     int32_t feed_mode_line;
     int32_t rotary_refused;
-    int32_t note_count[9];
-    int32_t note_line[9];
-    int32_t note_word[9];
+    int32_t note_count[10];
+    int32_t note_line[10];
+    int32_t note_word[10];
     double moved_mm[9];
     int32_t misfits;
     int32_t misfits_other_centre;
@@ -890,6 +898,7 @@ typedef struct {
     int32_t cutter_code;
     int32_t cutter_line;
     double cutter_radius_mm;
+    double cutter_other_mm[2];
     int8_t cutter_entered;
     int8_t cutter_failed;
     double cutter_normal[2];
@@ -938,100 +947,103 @@ typedef char State_feed_of_other_unit_stands_at_72[offsetof(State, feed_of_other
 typedef char State_rpm_stands_at_80[offsetof(State, rpm) == 80 ? 1 : -1];
 typedef char State_direction_stands_at_88[offsetof(State, direction) == 88 ? 1 : -1];
 typedef char State_tool_stands_at_92[offsetof(State, tool) == 92 ? 1 : -1];
-typedef char State_selected_tool_stands_at_96[offsetof(State, selected_tool) == 96 ? 1 : -1];
-typedef char State_selected_line_stands_at_100[offsetof(State, selected_line) == 100 ? 1 : -1];
-typedef char State_length_offset_stands_at_104[offsetof(State, length_offset) == 104 ? 1 : -1];
-typedef char State_offset_tool_stands_at_112[offsetof(State, offset_tool) == 112 ? 1 : -1];
-typedef char State_exact_stop_stands_at_116[offsetof(State, exact_stop) == 116 ? 1 : -1];
-typedef char State_tolerance_stands_at_120[offsetof(State, tolerance) == 120 ? 1 : -1];
-typedef char State_work_offset_stands_at_128[offsetof(State, work_offset) == 128 ? 1 : -1];
-typedef char State_base_mm_stands_at_136[offsetof(State, base_mm) == 136 ? 1 : -1];
-typedef char State_shift_mm_stands_at_160[offsetof(State, shift_mm) == 160 ? 1 : -1];
-typedef char State_shift_kept_mm_stands_at_184[offsetof(State, shift_kept_mm) == 184 ? 1 : -1];
-typedef char State_turned_under_shift_stands_at_208[offsetof(State, turned_under_shift) == 208 ? 1 : -1];
-typedef char State_shift_line_stands_at_212[offsetof(State, shift_line) == 212 ? 1 : -1];
-typedef char State_pivot_mm_stands_at_216[offsetof(State, pivot_mm) == 216 ? 1 : -1];
-typedef char State_rotation_cos_stands_at_232[offsetof(State, rotation_cos) == 232 ? 1 : -1];
-typedef char State_rotation_sin_stands_at_240[offsetof(State, rotation_sin) == 240 ? 1 : -1];
-typedef char State_rotated_stands_at_248[offsetof(State, rotated) == 248 ? 1 : -1];
-typedef char State_offsets_taken_stands_at_249[offsetof(State, offsets_taken) == 249 ? 1 : -1];
-typedef char State_home_28_stands_at_256[offsetof(State, home_28) == 256 ? 1 : -1];
-typedef char State_home_30_stands_at_280[offsetof(State, home_30) == 280 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_304[offsetof(State, rotary_deg) == 304 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_328[offsetof(State, rotary_unknown) == 328 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_336[offsetof(State, home_28_deg) == 336 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_360[offsetof(State, home_30_deg) == 360 ? 1 : -1];
-typedef char State_tool_vector_stands_at_384[offsetof(State, tool_vector) == 384 ? 1 : -1];
-typedef char State_has_vector_stands_at_408[offsetof(State, has_vector) == 408 ? 1 : -1];
-typedef char State_traori_stands_at_409[offsetof(State, traori) == 409 ? 1 : -1];
-typedef char State_zero_in_doubt_stands_at_410[offsetof(State, zero_in_doubt) == 410 ? 1 : -1];
-typedef char State_length_code_stands_at_412[offsetof(State, length_code) == 412 ? 1 : -1];
-typedef char State_feed_word_stands_at_416[offsetof(State, feed_word) == 416 ? 1 : -1];
-typedef char State_arcs_stands_at_424[offsetof(State, arcs) == 424 ? 1 : -1];
-typedef char State_mist_stands_at_428[offsetof(State, mist) == 428 ? 1 : -1];
-typedef char State_flood_stands_at_429[offsetof(State, flood) == 429 ? 1 : -1];
-typedef char State_ended_stands_at_430[offsetof(State, ended) == 430 ? 1 : -1];
-typedef char State_end_line_stands_at_432[offsetof(State, end_line) == 432 ? 1 : -1];
-typedef char State_tape_marks_stands_at_436[offsetof(State, tape_marks) == 436 ? 1 : -1];
-typedef char State_unit_named_stands_at_440[offsetof(State, unit_named) == 440 ? 1 : -1];
-typedef char State_blocks_stands_at_448[offsetof(State, blocks) == 448 ? 1 : -1];
-typedef char State_level_stands_at_456[offsetof(State, level) == 456 ? 1 : -1];
-typedef char State_largest_mm_stands_at_464[offsetof(State, largest_mm) == 464 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_472[offsetof(State, unknown_feed_line) == 472 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_476[offsetof(State, unknown_reported) == 476 ? 1 : -1];
-typedef char State_doubt_stands_at_480[offsetof(State, doubt) == 480 ? 1 : -1];
-typedef char State_motion_line_stands_at_484[offsetof(State, motion_line) == 484 ? 1 : -1];
-typedef char State_distance_line_stands_at_488[offsetof(State, distance_line) == 488 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_492[offsetof(State, feed_mode_line) == 492 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_496[offsetof(State, rotary_refused) == 496 ? 1 : -1];
-typedef char State_note_count_stands_at_500[offsetof(State, note_count) == 500 ? 1 : -1];
-typedef char State_note_line_stands_at_536[offsetof(State, note_line) == 536 ? 1 : -1];
-typedef char State_note_word_stands_at_572[offsetof(State, note_word) == 572 ? 1 : -1];
-typedef char State_moved_mm_stands_at_608[offsetof(State, moved_mm) == 608 ? 1 : -1];
-typedef char State_misfits_stands_at_680[offsetof(State, misfits) == 680 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_684[offsetof(State, misfits_other_centre) == 684 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_688[offsetof(State, misfits_reversed) == 688 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_692[offsetof(State, misfits_exchanged) == 692 ? 1 : -1];
-typedef char State_spirals_stands_at_696[offsetof(State, spirals) == 696 ? 1 : -1];
-typedef char State_spiral_line_stands_at_700[offsetof(State, spiral_line) == 700 ? 1 : -1];
-typedef char State_spiral_start_stands_at_704[offsetof(State, spiral_start) == 704 ? 1 : -1];
-typedef char State_spiral_end_stands_at_712[offsetof(State, spiral_end) == 712 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_720[offsetof(State, spiral_unit_mm) == 720 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_728[offsetof(State, cutter_mode) == 728 ? 1 : -1];
-typedef char State_cutter_side_stands_at_732[offsetof(State, cutter_side) == 732 ? 1 : -1];
-typedef char State_cutter_code_stands_at_736[offsetof(State, cutter_code) == 736 ? 1 : -1];
-typedef char State_cutter_line_stands_at_740[offsetof(State, cutter_line) == 740 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_744[offsetof(State, cutter_radius_mm) == 744 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_752[offsetof(State, cutter_entered) == 752 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_753[offsetof(State, cutter_failed) == 753 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_760[offsetof(State, cutter_normal) == 760 ? 1 : -1];
-typedef char State_held_turn_stands_at_776[offsetof(State, held_turn) == 776 ? 1 : -1];
-typedef char State_held_line_stands_at_780[offsetof(State, held_line) == 780 ? 1 : -1];
-typedef char State_held_from_stands_at_784[offsetof(State, held_from) == 784 ? 1 : -1];
-typedef char State_held_along_stands_at_800[offsetof(State, held_along) == 800 ? 1 : -1];
-typedef char State_held_centre_stands_at_816[offsetof(State, held_centre) == 816 ? 1 : -1];
-typedef char State_held_w_stands_at_832[offsetof(State, held_w) == 832 ? 1 : -1];
-typedef char State_held_sweep_stands_at_848[offsetof(State, held_sweep) == 848 ? 1 : -1];
-typedef char State_held_rows_stands_at_856[offsetof(State, held_rows) == 856 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_872[offsetof(State, cutter_rows_removed) == 872 ? 1 : -1];
-typedef char State_held_events_stands_at_880[offsetof(State, held_events) == 880 ? 1 : -1];
-typedef char State_retract_stands_at_888[offsetof(State, retract) == 888 ? 1 : -1];
-typedef char State_retract_line_stands_at_892[offsetof(State, retract_line) == 892 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_896[offsetof(State, unset_parameter) == 896 ? 1 : -1];
-typedef char State_unset_line_stands_at_900[offsetof(State, unset_line) == 900 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_904[offsetof(State, retract_unnamed_line) == 904 ? 1 : -1];
-typedef char State_in_cycles_stands_at_908[offsetof(State, in_cycles) == 908 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_912[offsetof(State, cycle_level_mm) == 912 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_920[offsetof(State, cycle_level_known) == 920 ? 1 : -1];
-typedef char State_cycle_r_stands_at_928[offsetof(State, cycle_r) == 928 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_936[offsetof(State, cycle_depth) == 936 ? 1 : -1];
-typedef char State_cycle_q_stands_at_944[offsetof(State, cycle_q) == 944 ? 1 : -1];
-typedef char State_cycle_p_stands_at_952[offsetof(State, cycle_p) == 952 ? 1 : -1];
-typedef char State_cycle_line_stands_at_960[offsetof(State, cycle_line) == 960 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_964[offsetof(State, cycle_plane) == 964 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_968[offsetof(State, cycle_unit_mm) == 968 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_976[offsetof(State, cycle_absolute) == 976 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 984 ? 1 : -1];
+typedef char State_tool_stated_stands_at_96[offsetof(State, tool_stated) == 96 ? 1 : -1];
+typedef char State_selected_tool_stands_at_100[offsetof(State, selected_tool) == 100 ? 1 : -1];
+typedef char State_selected_line_stands_at_104[offsetof(State, selected_line) == 104 ? 1 : -1];
+typedef char State_length_offset_stands_at_112[offsetof(State, length_offset) == 112 ? 1 : -1];
+typedef char State_offset_tool_stands_at_120[offsetof(State, offset_tool) == 120 ? 1 : -1];
+typedef char State_exact_stop_stands_at_124[offsetof(State, exact_stop) == 124 ? 1 : -1];
+typedef char State_tolerance_stands_at_128[offsetof(State, tolerance) == 128 ? 1 : -1];
+typedef char State_work_offset_stands_at_136[offsetof(State, work_offset) == 136 ? 1 : -1];
+typedef char State_base_mm_stands_at_144[offsetof(State, base_mm) == 144 ? 1 : -1];
+typedef char State_shift_mm_stands_at_168[offsetof(State, shift_mm) == 168 ? 1 : -1];
+typedef char State_shift_kept_mm_stands_at_192[offsetof(State, shift_kept_mm) == 192 ? 1 : -1];
+typedef char State_turned_under_shift_stands_at_216[offsetof(State, turned_under_shift) == 216 ? 1 : -1];
+typedef char State_shift_line_stands_at_220[offsetof(State, shift_line) == 220 ? 1 : -1];
+typedef char State_pivot_mm_stands_at_224[offsetof(State, pivot_mm) == 224 ? 1 : -1];
+typedef char State_rotation_cos_stands_at_240[offsetof(State, rotation_cos) == 240 ? 1 : -1];
+typedef char State_rotation_sin_stands_at_248[offsetof(State, rotation_sin) == 248 ? 1 : -1];
+typedef char State_rotated_stands_at_256[offsetof(State, rotated) == 256 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_257[offsetof(State, offsets_taken) == 257 ? 1 : -1];
+typedef char State_home_28_stands_at_264[offsetof(State, home_28) == 264 ? 1 : -1];
+typedef char State_home_30_stands_at_288[offsetof(State, home_30) == 288 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_312[offsetof(State, rotary_deg) == 312 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_336[offsetof(State, rotary_unknown) == 336 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_344[offsetof(State, home_28_deg) == 344 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_368[offsetof(State, home_30_deg) == 368 ? 1 : -1];
+typedef char State_tool_vector_stands_at_392[offsetof(State, tool_vector) == 392 ? 1 : -1];
+typedef char State_has_vector_stands_at_416[offsetof(State, has_vector) == 416 ? 1 : -1];
+typedef char State_traori_stands_at_417[offsetof(State, traori) == 417 ? 1 : -1];
+typedef char State_zero_in_doubt_stands_at_418[offsetof(State, zero_in_doubt) == 418 ? 1 : -1];
+typedef char State_length_code_stands_at_420[offsetof(State, length_code) == 420 ? 1 : -1];
+typedef char State_feed_word_stands_at_424[offsetof(State, feed_word) == 424 ? 1 : -1];
+typedef char State_arcs_stands_at_432[offsetof(State, arcs) == 432 ? 1 : -1];
+typedef char State_mist_stands_at_436[offsetof(State, mist) == 436 ? 1 : -1];
+typedef char State_flood_stands_at_437[offsetof(State, flood) == 437 ? 1 : -1];
+typedef char State_ended_stands_at_438[offsetof(State, ended) == 438 ? 1 : -1];
+typedef char State_end_line_stands_at_440[offsetof(State, end_line) == 440 ? 1 : -1];
+typedef char State_tape_marks_stands_at_444[offsetof(State, tape_marks) == 444 ? 1 : -1];
+typedef char State_unit_named_stands_at_448[offsetof(State, unit_named) == 448 ? 1 : -1];
+typedef char State_blocks_stands_at_456[offsetof(State, blocks) == 456 ? 1 : -1];
+typedef char State_level_stands_at_464[offsetof(State, level) == 464 ? 1 : -1];
+typedef char State_largest_mm_stands_at_472[offsetof(State, largest_mm) == 472 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_480[offsetof(State, unknown_feed_line) == 480 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_484[offsetof(State, unknown_reported) == 484 ? 1 : -1];
+typedef char State_doubt_stands_at_488[offsetof(State, doubt) == 488 ? 1 : -1];
+typedef char State_motion_line_stands_at_492[offsetof(State, motion_line) == 492 ? 1 : -1];
+typedef char State_distance_line_stands_at_496[offsetof(State, distance_line) == 496 ? 1 : -1];
+typedef char State_distance_unnamed_line_stands_at_500[offsetof(State, distance_unnamed_line) == 500 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_504[offsetof(State, feed_mode_line) == 504 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_508[offsetof(State, rotary_refused) == 508 ? 1 : -1];
+typedef char State_note_count_stands_at_512[offsetof(State, note_count) == 512 ? 1 : -1];
+typedef char State_note_line_stands_at_552[offsetof(State, note_line) == 552 ? 1 : -1];
+typedef char State_note_word_stands_at_592[offsetof(State, note_word) == 592 ? 1 : -1];
+typedef char State_moved_mm_stands_at_632[offsetof(State, moved_mm) == 632 ? 1 : -1];
+typedef char State_misfits_stands_at_704[offsetof(State, misfits) == 704 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_708[offsetof(State, misfits_other_centre) == 708 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_712[offsetof(State, misfits_reversed) == 712 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_716[offsetof(State, misfits_exchanged) == 716 ? 1 : -1];
+typedef char State_spirals_stands_at_720[offsetof(State, spirals) == 720 ? 1 : -1];
+typedef char State_spiral_line_stands_at_724[offsetof(State, spiral_line) == 724 ? 1 : -1];
+typedef char State_spiral_start_stands_at_728[offsetof(State, spiral_start) == 728 ? 1 : -1];
+typedef char State_spiral_end_stands_at_736[offsetof(State, spiral_end) == 736 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_744[offsetof(State, spiral_unit_mm) == 744 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_752[offsetof(State, cutter_mode) == 752 ? 1 : -1];
+typedef char State_cutter_side_stands_at_756[offsetof(State, cutter_side) == 756 ? 1 : -1];
+typedef char State_cutter_code_stands_at_760[offsetof(State, cutter_code) == 760 ? 1 : -1];
+typedef char State_cutter_line_stands_at_764[offsetof(State, cutter_line) == 764 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_768[offsetof(State, cutter_radius_mm) == 768 ? 1 : -1];
+typedef char State_cutter_other_mm_stands_at_776[offsetof(State, cutter_other_mm) == 776 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_792[offsetof(State, cutter_entered) == 792 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_793[offsetof(State, cutter_failed) == 793 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_800[offsetof(State, cutter_normal) == 800 ? 1 : -1];
+typedef char State_held_turn_stands_at_816[offsetof(State, held_turn) == 816 ? 1 : -1];
+typedef char State_held_line_stands_at_820[offsetof(State, held_line) == 820 ? 1 : -1];
+typedef char State_held_from_stands_at_824[offsetof(State, held_from) == 824 ? 1 : -1];
+typedef char State_held_along_stands_at_840[offsetof(State, held_along) == 840 ? 1 : -1];
+typedef char State_held_centre_stands_at_856[offsetof(State, held_centre) == 856 ? 1 : -1];
+typedef char State_held_w_stands_at_872[offsetof(State, held_w) == 872 ? 1 : -1];
+typedef char State_held_sweep_stands_at_888[offsetof(State, held_sweep) == 888 ? 1 : -1];
+typedef char State_held_rows_stands_at_896[offsetof(State, held_rows) == 896 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_912[offsetof(State, cutter_rows_removed) == 912 ? 1 : -1];
+typedef char State_held_events_stands_at_920[offsetof(State, held_events) == 920 ? 1 : -1];
+typedef char State_retract_stands_at_928[offsetof(State, retract) == 928 ? 1 : -1];
+typedef char State_retract_line_stands_at_932[offsetof(State, retract_line) == 932 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_936[offsetof(State, unset_parameter) == 936 ? 1 : -1];
+typedef char State_unset_line_stands_at_940[offsetof(State, unset_line) == 940 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_944[offsetof(State, retract_unnamed_line) == 944 ? 1 : -1];
+typedef char State_in_cycles_stands_at_948[offsetof(State, in_cycles) == 948 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_952[offsetof(State, cycle_level_mm) == 952 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_960[offsetof(State, cycle_level_known) == 960 ? 1 : -1];
+typedef char State_cycle_r_stands_at_968[offsetof(State, cycle_r) == 968 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_976[offsetof(State, cycle_depth) == 976 ? 1 : -1];
+typedef char State_cycle_q_stands_at_984[offsetof(State, cycle_q) == 984 ? 1 : -1];
+typedef char State_cycle_p_stands_at_992[offsetof(State, cycle_p) == 992 ? 1 : -1];
+typedef char State_cycle_line_stands_at_1000[offsetof(State, cycle_line) == 1000 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_1004[offsetof(State, cycle_plane) == 1004 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_1008[offsetof(State, cycle_unit_mm) == 1008 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_1016[offsetof(State, cycle_absolute) == 1016 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1024 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

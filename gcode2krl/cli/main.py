@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "init": "Write the cell file of your robot from your answers and the controller's archive.",
     "translate": "Translate G-code into a KRL program, verify it, and print a summary.",
+    "inspect": "Show what a program is: control, CAM, unit, tools, offsets, extents, what the cell must say.",
     "batch": "Translate many parts: folders, patterns, files, @lists, or a TOML file with a cell a folder.",
     "predict": "Predict what the robot will do: path, timing, joints, cutting forces, deflection.",
     "verify": "Read a KRL program back, compare it with its G-code, and judge its hazards anew.",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints32
-from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.errors import input_error
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import vocabulary as v
@@ -92,6 +92,18 @@ REASONS: Final = (
         "; ends a block on this control, and a word stands behind it",
         "write a comment in ( ), a block in a line of its own",
     ),
+    (
+        "the control would round or chamfer the corner to the next block",
+        "let the post write the corner as G1, G2 and G3",
+    ),
+    (
+        "0 repeats store the cycle and drill nothing, and whether the tool goes to X and Y is not sure",
+        "write the cycle in the block of its first hole, without L0 and K0",
+    ),
+    (
+        "G10 is read as G10 L2 P1 to P6 with X, Y and Z, under G90 alone",
+        "write it so, or remove the block and state offsets in [work_offsets] and [tool.N] of the cell",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -104,6 +116,7 @@ _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
 REASON_NO_TIP, REASON_VECTOR_AND_ANGLE, REASON_VECTOR_ARC, REASON_OTHER_TIP = range(34, 38)
 REASON_SHIFT_AND_TIP, REASON_ZERO_AND_TIP, REASON_FEED_AXES = range(38, 41)
 REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
+REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -231,7 +244,7 @@ _FANUC_REFUSED = {
     _RETURN: (29,),
     _HOME: (27,),
     _SETTING: (22,),
-    _NUMBERS: (10, 11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
+    _NUMBERS: (11, 43.1, 43.2, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3),
     _LEAD: (41, 41.1, 42, 42.1),
     _CYCLE: (70, 71, 72, 75, 77, 78, 79),
 }
@@ -246,6 +259,7 @@ _FANUC: dict[str, Any] = {
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
     "g80_keeps_motion": True,
+    "start": {"retract": v.G98, "retract_line": -1},
     "idle_letters": "D",
 }
 _SINUMERIK_STATEMENTS = {
@@ -288,6 +302,7 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
     _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
+    _kind(d.REFUSED, REASON_CORNER): ("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM"),
     _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
@@ -335,25 +350,15 @@ _LIST: Final = (
 DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _LIST}
 """The dialects by their names, the default first."""
 DEFAULT: Final = DIALECT_NAMES[0]
-_NOT_READ: Final = {
-    "heidenhain": (
-        "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code",
-        "export the part again with a post for LinuxCNC, Fanuc or Sinumerik",
-    ),
-}
+OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
+CONVERSATIONAL: Final = "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 
 def dialect_of(name: str, source: str) -> Dialect:
     """Return a dialect by its name; raises `NotUnderstoodError` where it is none that is read."""
     if name in DIALECTS:
         return DIALECTS[name]
-    if name in _NOT_READ:
-        raise not_read(name, source)
+    if name == "heidenhain":
+        raise input_error("dialect-unknown", CONVERSATIONAL, OTHER_POST, source=source)
     allowed = ", ".join(DIALECTS)
     raise input_error("dialect-unknown", f"dialect {name!r}; allowed: {allowed}", source=source)
-
-
-def not_read(name: str, source: str) -> NotUnderstoodError:
-    """Return the refusal of a language that is no G-code."""
-    what, remedy = _NOT_READ[name]
-    return input_error("dialect-unknown", what, remedy, source=source)

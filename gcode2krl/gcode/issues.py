@@ -22,6 +22,7 @@ from gcode2krl.gcode.state import (
     NOTE_HOME,
     NOTE_OVERRIDE,
     NOTE_ROTARY,
+    NOTE_SMALL_ARC,
     NOTE_STATEMENT,
 )
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
@@ -54,6 +55,11 @@ _NOTES = {
         "override-switch",
         "M{number} switches overrides, which have no meaning on this robot; not read ({blocks})",
         "nothing to do; the override stands on the robot's panel",
+    ),
+    NOTE_SMALL_ARC: (
+        "arc-small",
+        "an arc that is smaller as a whole than the chord tolerance is read as a straight move ({blocks})",
+        "nothing to do; a post that leaves such arcs out makes shorter programs",
     ),
     NOTE_CODE: (
         "dialect-harmless",
@@ -155,6 +161,14 @@ def program_issues(
         yield _unset(int(state["unset_line"]), int(state["unset_parameter"]), programs)
     if state["retract_unnamed_line"]:
         yield _retract_unnamed(int(state["retract_unnamed_line"]))
+    if state["distance_unnamed_line"]:
+        yield Issue(
+            "warning",
+            "start-unnamed",
+            int(state["distance_unnamed_line"]),
+            "a move before G90 or G91: with which of them a Fanuc starts is a parameter; read under G90",
+            "write G90 before it; or --allow start-unnamed where the control starts with G90, as a Haas does",
+        )
     if not state["ended"]:
         yield _no_end(cut_off=state["tape_marks"] == 1)
     if rest_line:

@@ -314,9 +314,9 @@ class Flow:
         self.lines["target"][found.row] = self._word(row) + 1
         self._lead_to_unread(found)
 
-    def _return(self, row: int, label: Label) -> None:
-        found = self._sub_at_hand()
-        if found is None or found.label != label:
+    def _return(self, row: int, _label: Label) -> None:
+        # LinuxCNC leaves the subprogram whatever the label is: that of an if or a loop around it too
+        if self._sub_at_hand() is None:
             self._fault(row, faults.FAULT_NOT_IN_SUB)
         else:
             self._set(row, tables.KIND_RETURN)

@@ -20,7 +20,8 @@ from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
-from gcode2krl.gcode.other_dialects import refuse_other_languages, with_other_dialects
+from gcode2krl.gcode.origin import control_of, refuse_foreign
+from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
 from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
@@ -41,8 +42,14 @@ from gcode2krl.gcode.state import (
     WORK_OFFSETS,
     initial_state,
 )
-from gcode2krl.gcode.text import pieces
-from gcode2krl.gcode.tool_comments import NamedDiameter, named_diameters, other_tools, tool_not_changed
+from gcode2krl.gcode.text import beginning, pieces
+from gcode2krl.gcode.tool_comments import (
+    NamedTool,
+    changes_in_comments,
+    named_tools,
+    other_tools,
+    tool_not_changed,
+)
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
 
@@ -57,6 +64,9 @@ _FIRST_ROWS, _FIRST_EVENTS = 8192, 256
 _MOST_REST_BYTES = 8_000_000
 """Bytes behind the program's end in which lines that are not read are looked for."""
 _MOST_ISSUES = 1000
+
+_HEAD_BYTES, _MARKED_BYTES = 4000, 1_000_000
+"""So much of a program is looked through for marks of its control: where it is read, where it is refused."""
 
 Progress = Callable[[int], None]
 
@@ -106,7 +116,7 @@ def read_gcode(
     """
     name = str(path)
 
-    def read(as_dialect: str, hear: Progress | None) -> Toolpath:
+    def read(as_dialect: str, hear: Progress | None = None) -> Toolpath:
         try:
             with Path(path).open("rb") as stream:
                 return read_stream(
@@ -125,9 +135,15 @@ def read_gcode(
             raise input_error("file-unreadable", what, "check the path", source=name) from None
 
     try:
-        return read(dialect, progress)
+        toolpath = read(dialect, progress)
     except NotUnderstoodError as error:
-        raise with_other_dialects(error, dialect, lambda other: read(other, None)) from None
+        mark = control_of(beginning(path, name, _MARKED_BYTES))
+        raise with_other_control(error, mark, dialect, read) from None
+    if dialect != DEFAULT:  # it was named: nobody knows better
+        return toolpath
+    mark = control_of(beginning(path, name, _HEAD_BYTES))
+    doubts = tuple(doubts_of_control(toolpath, mark, dialect, read))
+    return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
 
 def read_stream(
@@ -171,12 +187,11 @@ def read_stream(
         **_rotary_settings(cell),
     )
     with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
-        head, diameters = _interpreted(
-            interpreter, scanned, spoken, name, _size_of(stream), folders, progress
-        )
+        head, named = _interpreted(interpreter, scanned, spoken, name, _size_of(stream), folders, progress)
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
-        doubts += other_tools(diameters, toolpath, cell)
+        doubts += other_tools(named, toolpath, cell)
+        doubts += changes_in_comments(named, toolpath, cell)
         doubts += tool_not_changed(*interpreter.selected(), toolpath, cell)
     return replace(toolpath, issues=(*toolpath.issues, *doubts)) if doubts else toolpath
 
@@ -189,15 +204,15 @@ def _interpreted(
     size: int,
     folders: Sequence[Path],
     progress: Progress | None,
-) -> tuple[bytes, list[NamedDiameter]]:
-    """Interpret a program; return how its text begins, and the diameters that its comments name."""
+) -> tuple[bytes, list[NamedTool]]:
+    """Interpret a program; return how its text begins, and the tools that its comments name."""
     head, rest_bytes = b"", 0
-    diameters: list[NamedDiameter] = []
+    named: list[NamedTool] = []
     for first_line, text, words in scanned:
         if not interpreter.ended:
             if not head:
                 head = text[:4000]
-                refuse_other_languages(head, name)
+                refuse_foreign(text, name)
             stopped_at = interpreter.feed(words, text, first_line, size)
             if stopped_at is not None:
                 # a jump may lead back to a line that has run, as far as it is in this piece
@@ -206,14 +221,14 @@ def _interpreted(
                 whole = b"".join((rest, *(more for _, more, _ in scanned)))
                 interpreter.run_whole(whole, begin, stopped_at, folders)
                 break
-            diameters += named_diameters(text, first_line)
+            named += named_tools(text, first_line)
             if progress is not None:
                 progress(len(text))
         if interpreter.ended:
             rest_bytes += len(text)
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
-    return head, diameters
+    return head, named
 
 
 def _mounted_tool(cell: "Cell | None") -> int:

@@ -35,6 +35,7 @@ STATE = np.dtype(
         ("rpm", "f8"),
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
         ("tool", "i4"),
+        ("tool_stated", "i1"),  # by M6 or M61; before it the cell's mounted tool is in the spindle
         ("selected_tool", "i4"),  # -1 = none yet
         ("selected_line", "i4"),  # where it was named
         ("length_offset", "f8"),  # NaN = G49
@@ -79,11 +80,12 @@ STATE = np.dtype(
         ("doubt", "i4"),  # bits of what a block that was not understood may have set
         ("motion_line", "i4"),  # where the motion mode was named, 0 = nowhere
         ("distance_line", "i4"),  # where G90 or G91 was named last, 0 = nowhere
+        ("distance_unnamed_line", "i4"),  # first move of a Fanuc before G90 or G91, 0 = nowhere
         ("feed_mode_line", "i4"),  # where G93, G94 or G95 was named last, 0 = nowhere
         ("rotary_refused", "i4"),  # bits of the rotary letters that were refused
-        ("note_count", "i4", 9),  # blocks with something harmless, by NOTE_…
-        ("note_line", "i4", 9),  # the first of them
-        ("note_word", "i4", 9),
+        ("note_count", "i4", 10),  # blocks with something harmless, by NOTE_…
+        ("note_line", "i4", 10),  # the first of them
+        ("note_word", "i4", 10),
         ("moved_mm", "f8", 9),  # how far the first of each of NOTE_LOCAL, … moves the zero
         ("misfits", "i4"),  # arcs whose radii differ too much
         ("misfits_other_centre", "i4"),  # of them: those that would fit in the other centre mode
@@ -99,6 +101,7 @@ STATE = np.dtype(
         ("cutter_code", "i4"),  # ten times the number of the G-code in force
         ("cutter_line", "i4"),  # where it stands
         ("cutter_radius_mm", "f8"),
+        ("cutter_other_mm", "f8", 2),  # diameters of G41 and of the tool that cuts, until it is told; else 0
         ("cutter_entered", "i1"),  # the entry move has been made
         ("cutter_failed", "i1"),  # a corner has been reported: further ones are consequences
         ("cutter_normal", "f8", 2),  # in the plane, from the programmed point (x, y, z) to the tool
@@ -113,7 +116,7 @@ STATE = np.dtype(
         ("cutter_rows_removed", "i8"),  # rows of held arcs that have been taken away again, in all
         ("held_events", "i8"),  # events before it
         ("retract", "i4"),  # ten times 98 or 99
-        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere
+        ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere, -1 = at the start
         ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
         ("unset_line", "i4"),  # where, 0 = nowhere
         ("retract_unnamed_line", "i4"),  # the first cycle that retracts to R without G98 or G99
@@ -170,7 +173,7 @@ DOUBT_PLANE, DOUBT_DISTANCE, DOUBT_CENTRE, DOUBT_FEED_MODE, DOUBT_TOOL, DOUBT_SP
 DOUBT_POSITION = DOUBT_X | DOUBT_Y | DOUBT_Z
 DOUBT_ALL = (1 << 12) - 1
 NOTE_ROTARY, NOTE_CENTRE, NOTE_HOME, NOTE_OVERRIDE, NOTE_LOCAL, NOTE_SHIFT, NOTE_TABLE = range(7)
-NOTE_CODE, NOTE_STATEMENT = 7, 8
+NOTE_CODE, NOTE_STATEMENT, NOTE_SMALL_ARC = 7, 8, 9
 
 
 def initial_state() -> NDArray[np.void]:

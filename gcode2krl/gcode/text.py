@@ -5,6 +5,7 @@ What is no text of a program (UTF-16, a picture, lines without an end) is refuse
 
 import zlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -56,6 +57,15 @@ def pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
             yield line, whole
             line += _line_count(whole)
         rest = text[end:]
+
+
+def beginning(path: str | Path, name: str, most_bytes: int) -> bytes:
+    """Return the first bytes of a program's text, unpacked; empty where it is no text."""
+    try:
+        with Path(path).open("rb") as stream:
+            return next((text for _, text in pieces(stream, name)), b"")[:most_bytes]
+    except (NotUnderstoodError, OSError):
+        return b""
 
 
 def _blocks(stream: BinaryIO, name: str) -> Iterator[bytes]:

@@ -18,7 +18,7 @@ from gcode2krl.units import MM_PER_INCH
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
 
-_WORDS = (b"D=", b"DIA", b"MILL")
+_WORDS = (b"D=", b"DIA", b"MILL", b"M6", b"M06")
 _NUMBER = r"(\d+(?:\.\d*)?|\.\d+|\d+/\d+)"
 _UNIT = r"""(MM|INCH(?:ES)?|IN\b|")?"""
 _MILL = r"(?:(?:FLAT|BALL|BULL|SQUARE|CARBIDE|HSS|SPIRAL|UPCUT|DOWNCUT|\dF|\d-FLUTE)[- ]*){0,3}"
@@ -27,43 +27,57 @@ _DIAMETER = tuple(
     for pattern in (
         rf"\bT\s*\d+\b.*?\bD\s*=\s*{_NUMBER}\s*{_UNIT}",  # Fusion, HSM: T1 D=10. CR=0. - flat end mill
         rf"\b(?:TOOL|CUTTER|MILL|BIT)[ _]*DIA(?:METER|M)?\b\.?\s*[-:=]*\s*{_NUMBER}\s*{_UNIT}",
+        rf"\bTOOL\b.*\bDIAMETER\s*[:=]\s*{_NUMBER}\s*{_UNIT}",  # FreeCAD: Tool Path. Diameter: 4.0
         rf"\bEND\s?MILL\s*[\[{{]\s*{_NUMBER}\s*{_UNIT}\s*[\]}}]",  # Vectric: End Mill {6 mm}
         rf"(?<![\d./]){_NUMBER}\s*(MM|INCH|IN\b|\")[- ]*{_MILL}END\s?MILL\b",  # FreeCAD: 5mm Endmill
         rf"(?<![\d./])(\d+\.\d*|\.\d+|\d+/\d+)()[- ]*{_MILL}END\s?MILL\b",  # Mastercam: 10. FLAT ENDMILL
     )
 )
 _TOOL = re.compile(r"\bT(?:OOL)?\s*[-#:=]?\s*(\d+)\b(?!\s*(?:MM|IN\b|INCH|\"|[./]\d))")
+_CHANGE = re.compile(r"\bM0?6\s*T\s*(\d+)\b|\bT\s*(\d+)\s*M0?6\b")
 _OTHER = re.compile(r"\b(?:STOCK|HOLE|BORE|POCKET|HOLDER|SHANK|OFFSET|TAPER)\b")
 _COMMENT = re.compile(rb"\(([^)\n]*)\)|;([^\n]*)")
 _SLACK, _SLACK_MM = 0.02, 0.05
 """Comments round; a worn or reground mill is this far off."""
 
 
-class NamedDiameter(NamedTuple):
-    """What a comment says."""
+class NamedTool(NamedTuple):
+    """What a comment says of a tool."""
 
     line: int
     tool: int | None
-    value: float
-    unit: str
+    value: float = 0.0
+    """Its diameter, 0 where none is named."""
+    unit: str = ""
     """``mm``, ``inch`` or empty."""
+    is_change: bool = False
+    """The comment is a tool change that a post has left out: ``( M6 T2 )``."""
 
 
-def named_diameters(text: bytes, first_line: int) -> Iterator[NamedDiameter]:
-    """Yield the tool diameters that the comments of some whole lines name; the first line has this number."""
+def named_tools(text: bytes, first_line: int) -> Iterator[NamedTool]:
+    """Yield the tools that the comments of some whole lines name; the first line has this number.
+
+    A diameter without a tool behind a change in a comment is that of its tool.
+    """
     if b"(" not in text and b";" not in text:
         return
     capitals = text.upper()
-    at = -1
+    at, changed_to = -1, None
     for place in sorted({at for word in _WORDS for at in _places(capitals, word)}):
         if place < at:
             continue
         begin, at = capitals.rfind(b"\n", 0, place) + 1, capitals.find(b"\n", place)
         at = at if at >= 0 else len(capitals)
         for comment in _COMMENT.finditer(capitals[begin:at]):
-            said = _said((comment[1] or comment[2] or b"").decode("latin-1"))
+            words = (comment[1] or comment[2] or b"").decode("latin-1")
+            change, said = _CHANGE.search(words), _said(words)
+            line = first_line + capitals.count(b"\n", 0, begin) if change or said else 0
+            if change is not None:
+                changed_to = int(change[1] or change[2])
+                yield NamedTool(line, changed_to, is_change=True)
             if said is not None:
-                yield NamedDiameter(first_line + capitals.count(b"\n", 0, begin), *said)
+                tool, value, unit = said
+                yield NamedTool(line, changed_to if tool is None else tool, value, unit)
 
 
 def _places(text: bytes, word: bytes) -> Iterator[int]:
@@ -90,7 +104,7 @@ def _value(text: str) -> float:
     return float(above) / float(below) if below and float(below) else float(above)
 
 
-def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
+def other_tools(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
     """Yield a warning for each tool whose diameter in a comment is not that of the cell.
 
     A comment without a tool number counts where the program has one tool.
@@ -118,6 +132,25 @@ def other_tools(named: list[NamedDiameter], toolpath: Toolpath, cell: "Cell") ->
         )
 
 
+def changes_in_comments(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
+    """Yield a warning where comments change to a tool that no M6 puts into the spindle."""
+    changes = [said for said in named if said.is_change]
+    events = [event for event in toolpath.events if event.kind == "tool"]
+    there: set[int | None] = {int(event.values["tool"]) for event in events} or {cell.mounted_tool}
+    missing = next((said for said in changes if said.tool not in there), None)
+    numbers = {said.tool for said in changes}
+    if missing is None or (len(numbers) == 1 and not events and cell.mounted_tool is None):
+        return
+    if len(numbers) > 1 or events:
+        what = f"a comment changes to T{missing.tool}, and no M6 does: it would cut with the tool before it"
+        remedy = "let the post write T and M6, or one program a tool"
+    else:
+        number, mounted = missing.tool, cell.mounted_tool
+        what = f"a comment changes to T{number}, and no M6 does: the cell says that tool {mounted} is mounted"
+        remedy = f"mount tool {number} and give mounted_tool = {number} in the cell, or let the post write M6"
+    yield Issue("warning", "tool-not-changed", missing.line, what, remedy)
+
+
 def tool_not_changed(number: int, line: int, toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
     """Yield a warning where the program names one tool, changes to none, and the cell has another mounted."""
     changes = any(event.kind == "tool" for event in toolpath.events)
@@ -133,7 +166,7 @@ def tool_not_changed(number: int, line: int, toolpath: Toolpath, cell: "Cell") -
     )
 
 
-def _may_be(said: NamedDiameter, diameter_mm: float) -> bool:
+def _may_be(said: NamedTool, diameter_mm: float) -> bool:
     """Tell whether a comment may mean this diameter; a comment without a unit may mean mm or inches."""
     in_mm = {"mm": (1.0,), "inch": (MM_PER_INCH,), "": (1.0, MM_PER_INCH)}[said.unit]
     slack_mm = _SLACK * diameter_mm + _SLACK_MM

@@ -14,7 +14,9 @@ STRICTER_HERE = frozenset(
         "unit-doubtful",
         "cut-off",
         "offset-from-unknown",
+        "other-dialect",
         "parameter-unset",
+        "start-unnamed",
         "tool-length-differs",
         "tool-not-changed",
     }

@@ -176,7 +176,7 @@ def write_krl(
             plan, content = left_out(failure), plain
             report = written.read_back(content)
         issues += released(_issues_of(plan), (), strict)
-        issues += released(_size_issues(files.texts, content.targets, cell), (), strict)
+        issues += released(_size_issues(files.texts, content.targets, cell, split), (), strict)
         if not report.ok:
             raise RefusedError([*report.issues, *issues], source="" if file is None else file.name)
         places = files.take_places()
@@ -343,7 +343,7 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
     return [name for name in named if name]
 
 
-def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell) -> list[Issue]:
+def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell, split: str) -> list[Issue]:
     beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
     program = (text for name, text in texts.items() if not name.endswith(beside))
     size_mb = sum(map(len, program)) / BYTES_PER_MB
@@ -364,6 +364,7 @@ def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell) -> li
             0,
             f"{size_mb:.1f} MB, {motions} LIN: more than controllers are known to hold "
             f"({cell.program.warn_size_mb:g} MB, {cell.program.memory_moves} LIN)",
-            "use --split files, a larger arc chord tolerance, or split the job in the CAM",
+            ("" if split == "files" else "use --split files, ")
+            + "use a larger arc chord tolerance or --simplify, or split the job in the CAM",
         )
     ]

@@ -203,6 +203,34 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
     return true;
 }
 
+/* Tell whether an arc that LinuxCNC refuses as one of radius zero is smaller as a whole than its chords may be off. */
+static bool is_small(const Block *b, const Arc *arc) {
+    const State *s = b->state;
+    const double size_mm = 2.0 * greater(arc->from_radius_mm, arc->to_radius_mm);
+    const bool plain = s->feed_mode != V_INVERSE_TIME && !compensates(s) && !b->machine->rotary_axes;
+    const bool refused = lesser(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM;
+    return plain && refused && size_mm > 0.0 && size_mm <= b->machine->chord_tolerance_mm;
+}
+
+/* Write such an arc as a straight move to its end; return false where there is no room for it. */
+static bool small_arc(Block *b, const Arc *arc) {
+    double mm_s = 0.0;
+    const int finding = feed_speed(b, hypot(distance(arc->from, arc->to), arc->to_w - arc->from_w), &mm_s);
+    if (finding != F_OK) {
+        report_speed(b, finding);
+        return true;
+    }
+    if (b->counts->rows + 1 > b->machine->rows.feed_mm_s.rows) {
+        b->counts->rows_wanted = b->counts->rows + 1;
+        return false;
+    }
+    note(b, S_NOTE_SMALL_ARC, 0);
+    learn(b);
+    stand_at(b->state, arc->to_mm);
+    emit(b->machine, b->line, mm_s, false, false, NO_ARC);
+    return true;
+}
+
 /* Carry out G2 or G3; return false where there is no room for its rows. */
 bool arc_move(Block *b, Arc *arc) {
     if (b->state->cutter_mode & S_CUTTER_BESIDE) {
@@ -221,6 +249,8 @@ bool arc_move(Block *b, Arc *arc) {
     }
     arc->from_radius_mm = distance(arc->from, arc->centre);
     arc->to_radius_mm = distance(arc->to, arc->centre);
+    if (is_small(b, arc))
+        return small_arc(b, arc);
     if (lesser(arc->from_radius_mm, arc->to_radius_mm) < SMALLEST_RADIUS_MM) {
         report_unless(b, arc->rests_on, F_ARC_ZERO_RADIUS, (Says){0});
         return true;

@@ -214,6 +214,17 @@ void end_compensation(Block *b) {
     s->cutter_mode &= ~S_CUTTER_ON;
 }
 
+/* A tool change between G40 and the move that leads back: the program goes on from where the tool stands. */
+void stand_beside(State *s) {
+    if (!(s->cutter_mode & S_CUTTER_BESIDE))
+        return;
+    const double here_mm[3] = {s->x, s->y, s->z};
+    double at_mm[3];
+    in_space(s, tool_at(s), along_tool(s, here_mm), at_mm);
+    stand_at(s, at_mm);
+    s->cutter_mode &= ~S_CUTTER_BESIDE;
+}
+
 /* --- corners -------------------------------------------------------------------------------------------- */
 
 /* Go around an outside corner: an arc about the programmed point, or a rapid move. */

@@ -6,6 +6,7 @@
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/settings.h"
+#include "gcode/tool_lengths.h"
 
 /* From this difference on the diameter is not that of the tool in the spindle. */
 static const double OTHER_DIAMETER_MM = 1e-6;
@@ -54,8 +55,8 @@ static double of_tool(Floats diameter_mm, int32_t tool) {
 
 /* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
 static double tool_diameter(Block *b, int32_t code) {
-    const State *s = b->state;
-    int32_t tool = s->tool;
+    const int32_t there = tool_in_spindle(b->machine);
+    int32_t tool = there;
     if (b->has[V_WORD_D]) {
         tool = whole(b->word[V_WORD_D]);
         if (tool == NOT_WHOLE) {
@@ -63,7 +64,7 @@ static double tool_diameter(Block *b, int32_t code) {
             return NAN;
         }
         if (tool == 0)
-            tool = s->tool;
+            tool = there;
     }
     const double diameter_mm = of_tool(b->machine->tool_diameter_mm, tool);
     if (tool == 0)
@@ -82,11 +83,25 @@ static double diameter(Block *b, int32_t code) {
     return NAN;
 }
 
-/* Warn where the diameter is not that with which the tool in the spindle cuts. */
-static void compare_with_tool(Block *b, int32_t code, double diameter_mm) {
-    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, b->state->tool);
+/* Keep a diameter that is not that with which the tool in the spindle cuts, until a move is made with it. */
+static void compare_with_tool(Block *b, double diameter_mm) {
+    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, tool_in_spindle(b->machine));
     if (fabs(diameter_mm - in_cell_mm) > OTHER_DIAMETER_MM)
-        report(b, F_CUTTER_DIFFERS, (Says){.a = code, .b = diameter_mm, .c = in_cell_mm});
+        b->state->cutter_other_mm[0] = diameter_mm, b->state->cutter_other_mm[1] = in_cell_mm;
+}
+
+/* Warn of the other diameter where a block moves in the plane of compensation. */
+void tell_other_diameter(Block *b) {
+    State *s = b->state;
+    const double *other_mm = s->cutter_other_mm;
+    const bool across = s->plane == V_PLANE_XY ? b->has[V_WORD_X] || b->has[V_WORD_Y]
+                                               : b->has[V_WORD_X] || b->has[V_WORD_Z];
+    const bool centre = b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K];
+    if (other_mm[0] == other_mm[1] || !(across || centre))
+        return;
+    report_at(b, s->cutter_line, F_CUTTER_DIFFERS,
+              (Says){.a = s->cutter_code, .b = other_mm[0], .c = other_mm[1]});
+    s->cutter_other_mm[0] = s->cutter_other_mm[1] = 0.0;
 }
 
 /* --- on and off ----------------------------------------------------------------------------------------- */
@@ -109,14 +124,16 @@ static void turn_on(Block *b, int32_t code) {
     s->cutter_side = (code < V_G42 ? 1 : -1) * (diameter_mm < 0.0 ? -1 : 1);
     s->cutter_radius_mm = isnan(diameter_mm) || s->plane == V_PLANE_YZ ? 0.0 : 0.5 * fabs(diameter_mm);
     s->cutter_entered = s->cutter_failed = 0;
+    s->cutter_other_mm[0] = s->cutter_other_mm[1] = 0.0;
     if (!isnan(diameter_mm))
-        compare_with_tool(b, code, diameter_mm);
+        compare_with_tool(b, diameter_mm);
 }
 
 /* Carry out G40, G41, G42, G41.1 or G42.1 of a block, and refuse what must not stand beside or under them. */
 void cutter_compensation(Block *b) {
     const int32_t code = b->g[V_RADIUS_COMPENSATION];
     if (code == V_G40) {
+        b->state->cutter_other_mm[0] = b->state->cutter_other_mm[1] = 0.0;
         end_compensation(b);
     } else if (code >= 0) {
         b->used[V_WORD_D] |= b->has[V_WORD_D];

@@ -8,5 +8,6 @@
 void cutter_compensation(Block *block);
 void refuse_before_compensation(Block *block);
 void refuse_under_compensation(Block *block, int32_t code);
+void tell_other_diameter(Block *block);
 
 #endif

@@ -71,15 +71,29 @@ static void peck(Block *b, const Cycle *c) {
     }
 }
 
+/* Leave the hole at feed: LinuxCNC up to where the cycle ends, a Fanuc up to R and on at rapid speed. */
+static void leave_at_feed(Block *b, const Cycle *c) {
+    if (b->machine->programs == D_PROGRAMS_FANUC)
+        feed_to(b, c, c->r);
+    else
+        go_along(b, c, c->clear, c->clear != c->r ? c->level_known : c->r_known, c->mm_s);
+}
+
+static void rise_from_r(Block *b, const Cycle *c) {
+    if (b->machine->programs == D_PROGRAMS_FANUC && c->clear > c->r)
+        rapid_to(b, c, c->clear);
+}
+
 /* Tap: the spindle reverses at the bottom, and again above the hole. */
 static void tap(Block *b, const Cycle *c) {
     const int32_t direction = b->state->direction;
     turn(b, 0);
     turn(b, -direction);
     wait(b, c->dwell_s);
-    go_along(b, c, c->clear, c->clear != c->r ? c->level_known : c->r_known, c->mm_s);
+    leave_at_feed(b, c);
     turn(b, 0);
     turn(b, direction);
+    rise_from_r(b, c);
 }
 
 /* Leave the hole with the spindle at rest, so that the tool draws no groove. */
@@ -106,7 +120,8 @@ static void hole(Block *b, const Cycle *c) {
     case V_CYCLE_BORE_STOP: leave_at_rest(b, c); break;
     case V_CYCLE_BORE:
         wait(b, c->dwell_s);
-        go_along(b, c, c->clear, c->clear != c->r ? c->level_known : c->r_known, c->mm_s);
+        leave_at_feed(b, c);
+        rise_from_r(b, c);
         break;
     default:
         wait(b, c->dwell_s);

@@ -67,6 +67,13 @@ static int64_t refuse(Scan *scan, Evaluation *e, int64_t i, int64_t line, int re
     return line_end(scan->text, i);
 }
 
+/* Tell whether R or C follows a comma: the corner to the next block. */
+static bool names_corner(Bytes text, int64_t i) {
+    i = behind_blanks(text, i);
+    const int letter = i < text.rows ? AT(text, i) & ~CH_CASE_BIT : 0;
+    return letter == 'R' || letter == 'C';
+}
+
 /* --- lines of other kinds ------------------------------------------------------------------------------- */
 
 /* Return the place behind :1234 or the name behind %, i where neither begins there. */
@@ -349,6 +356,8 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
     }
     if (syntax & D_MACROS && c == ';' && !first && is_word_behind(text, i + 1))
         return refuse(scan, e, i, line, DR_REASON_SEMICOLON);
+    if (syntax & D_MACROS && c == ',' && names_corner(text, i + 1))
+        return refuse(scan, e, i, line, DR_REASON_CORNER);
     if (syntax & D_STATEMENTS && c == '(') /* behind no name: a comment elsewhere, an alarm on this control */
         return refuse(scan, e, i, line, DR_REASON_PARENTHESES);
     if (syntax & D_SKIP_LEVEL && c == '/' && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {

@@ -174,6 +174,16 @@ static bool read_edge(Block *b) {
     return true;
 }
 
+/* G10 of a Fanuc sets a work offset as LinuxCNC does, where it is absolute; its other uses are the control's own. */
+static bool read_g10(Block *b) {
+    const double p = b->word[V_WORD_P];
+    const int32_t counts = 1 << V_WORD_P | 1 << V_WORD_L;
+    const bool absolute = b->g[V_DISTANCE] >= 0 ? b->g[V_DISTANCE] == V_G90 : b->state->absolute != 0;
+    const bool offset = b->has[V_WORD_L] && b->word[V_WORD_L] == V_L_OFFSET && b->has[V_WORD_P] && is_whole(p) && p >= 1.0 && p <= 6.0;
+    b->pointless &= ~counts;
+    return (offset && absolute && !b->has[V_WORD_R]) || refuse(b, DR_REASON_G10, V_G10);
+}
+
 /* Dwells and repeats of a drilling cycle. */
 static bool read_cycle(Block *b) {
     if (!in_cycle(b))
@@ -181,6 +191,8 @@ static bool read_cycle(Block *b) {
     if (b->has[V_WORD_P] && b->machine->whole_dwell_letter == V_WORD_P && !is_whole(b->word[V_WORD_P]))
         return refuse_statement(b, DR_REASON_TWICE);
     b->word[V_WORD_P] *= b->machine->cycle_dwell_s;
+    if (b->machine->repeats_by_k && ((b->has[V_WORD_K] && b->word[V_WORD_K] == 0.0) || (b->has[V_WORD_L] && b->word[V_WORD_L] == 0.0)))
+        return refuse_statement(b, DR_REASON_STORED);
     if (!b->machine->repeats_by_k || !b->has[V_WORD_K])
         return true;
     b->has[V_WORD_K] = false;
@@ -323,6 +335,8 @@ static void leave_out_idle_words(Block *b) {
 bool to_core_words(Block *b) {
     leave_out_idle_words(b);
     bool good = read_cycle(b);
+    if (b->g[V_NON_MODAL] == V_G10 && b->machine->programs == D_PROGRAMS_FANUC)
+        good = read_g10(b) && good;
     if (b->pointless)
         good = read_pointless(b) && good;
     if (b->g[V_NON_MODAL] == V_G4)

@@ -9,6 +9,7 @@
 
 #include "gcode/block_words.h"
 #include "gcode/compensate.h"
+#include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
 #include "gcode/offsets.h"
@@ -233,6 +234,9 @@ static bool execute(Block *b) {
         return true;
     }
     if (moves) {
+        const bool by_parameter = b->machine->programs == D_PROGRAMS_FANUC && b->state->distance_line == 0;
+        if (by_parameter && b->state->distance_unnamed_line == 0)
+            b->state->distance_unnamed_line = b->line;
         use_axes(b);
         if (is_arc(b->state->motion))
             use_arc_words(b);
@@ -242,6 +246,8 @@ static bool execute(Block *b) {
             use_vector(b);
         if (is_cycle(b->state->motion) && !may_cycle(b))
             return true;
+        if (b->state->cutter_mode & S_CUTTER_ON)
+            tell_other_diameter(b);
         if (!move(b))
             return false;
     }

@@ -63,7 +63,7 @@ static double length_brought_back(const Block *b, const Modes *saved) {
     const double now_mm = b->state->length_offset;
     if (isnan(saved->length_offset) || !isnan(now_mm))
         return isnan(saved->length_offset) ? NAN : now_mm;
-    const double own_mm = length_of(b->machine, b->state->tool);
+    const double own_mm = length_of(b->machine, tool_in_spindle(b->machine));
     return isnan(own_mm) ? 0.0 : own_mm;
 }
 
@@ -123,7 +123,7 @@ static void restore_length(Block *b, const Modes *saved) {
         return;
     if (isnan(s->length_offset) != isnan(saved->length_offset)) {
         set_length_offset(s, saved->length_offset);
-        s->offset_tool = isnan(saved->length_offset) ? -1 : s->tool;
+        s->offset_tool = isnan(saved->length_offset) ? -1 : tool_in_spindle(b->machine);
     }
     s->length_code = saved->length_code;
 }
@@ -172,14 +172,14 @@ void set_tool_number(Block *b) {
         s->doubt |= S_DOUBT_TOOL;
         return;
     }
-    const bool nothing_named = s->tool == 0 && s->selected_tool < 0;
-    const int32_t there = nothing_named && b->machine->mounted_tool > 0 ? (int32_t)b->machine->mounted_tool : s->tool;
+    const int32_t there = tool_in_spindle(b->machine);
     if (tool != there) {
         report(b, FM_TOOL_NUMBER, (Says){.a = tool, .b = there});
         s->doubt |= S_DOUBT_TOOL;
         return;
     }
     s->tool = tool;
+    s->tool_stated = 1;
 }
 
 /* Tell whether another code of the block takes a word of an output; else report it. */

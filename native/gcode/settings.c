@@ -2,6 +2,7 @@
 
 #include "gcode/settings.h"
 
+#include "gcode/compensate.h"
 #include "gcode/cutter_settings.h"
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
@@ -86,7 +87,9 @@ static void change_tool(Block *b) {
         s->direction = 0;
         event(b, S_EVENT_SPINDLE, 0.0, S_IMPLIED_M5);
     }
+    stand_beside(s);
     s->tool = s->selected_tool;
+    s->tool_stated = 1;
     event(b, S_EVENT_TOOL, s->tool, 0.0);
     double length_mm = length_of(b->machine, s->tool);
     if (s->tool > 0 && isnan(length_mm)) {
@@ -102,7 +105,8 @@ static void change_tool(Block *b) {
 /* G43, with H or for the tool in the spindle. */
 static void apply_length(Block *b) {
     State *s = b->state;
-    int32_t tool = s->tool;
+    const int32_t there = tool_in_spindle(b->machine);
+    int32_t tool = there;
     if (b->has[V_WORD_H]) {
         b->used[V_WORD_H] = true;
         tool = whole(b->word[V_WORD_H]);
@@ -111,14 +115,14 @@ static void apply_length(Block *b) {
             s->doubt |= S_DOUBT_Z;
             return;
         }
-        if (tool != s->tool && tool != 0)
-            report(b, F_H_DIFFERS, (Says){.a = tool, .b = s->tool});
+        if (tool != there && tool != 0)
+            report(b, F_H_DIFFERS, (Says){.a = tool, .b = there});
         if (tool == 0)
-            tool = s->tool;
+            tool = there;
     }
     double length_mm = length_of(b->machine, tool);
     if (isnan(length_mm)) {
-        if (tool > 0 && tool != s->tool)
+        if (tool > 0 && tool != there)
             report(b, F_TOOL_UNDECLARED, (Says){.a = tool});
         length_mm = 0.0;
     }

@@ -24,6 +24,7 @@ ACCEPTED_HERE = {
     "m_too_large": "the same",
     "percent_in_program": "a lone closing tape mark ends the program",
     "arc_k_zero_in_xy": "centre-zero",
+    "arc_tiny_radius": "arc-small",
     "g28_with_rapid": "home-beside-rapid",
     "g28_with_motion": "home-beside-rapid",
 }

@@ -1,5 +1,6 @@
 """Cutter compensation: properties of the path, and what it must not stand beside."""
 
+import io
 import itertools
 import math
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from gcode2krl import Cell, Gcode2KrlError, load_cell, read_gcode
 from gcode2krl.cell.sections import Frame
+from gcode2krl.gcode import read_stream
 
 CHORD_MM = 0.01
 CELL = Cell.model_construct(tool={}, work_offsets={})
@@ -163,3 +165,20 @@ def test_a_machine_with_rotary_axes_that_stand_changes_nothing(tmp_path):
     for wrong in (text.replace("G1 X10\n", "G1 X10 A5\n"), text.replace("G41.1", "G0 A5\nG41.1")):
         with pytest.raises(Gcode2KrlError, match="rotary axes"):
             _read(tmp_path, wrong, cell)
+
+
+def test_a_tool_change_behind_g40_goes_on_from_where_the_tool_stands():
+    """As LinuxCNC: Z alone then moves along the tool, and does not lead back to the contour."""
+    head = "G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41 D1\nG1 X20 Y0 F500\nX50\nG40\n"
+    text = head + "{}G0 Z30\nG1 X60 Y20\nM2\n"
+    changed = read_stream(io.BytesIO(text.format("T1 M6\nG43 H1\n").encode()), "part.nc", load_cell())
+    assert changed.position_mm[-2:].tolist() == [[50.0, 8.0, 30.0], [60.0, 20.0, 30.0]]
+    kept = read_stream(io.BytesIO(text.format("").encode()), "part.nc", load_cell())
+    assert kept.position_mm[-2].tolist() == [50.0, 0.0, 30.0]
+
+
+@pytest.mark.parametrize(("move", "told"), [("G4 P1", False), ("G1 X40 F300", True), ("", False)])
+def test_another_diameter_is_told_where_something_is_cut_with_it(move, told):
+    text = f"G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41.1 D10\n{move}\nG40\nG1 X90 F500\nM2\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", load_cell())
+    assert [i.line for i in toolpath.issues if i.code == "cutter-differs"] == ([5] if told else [])

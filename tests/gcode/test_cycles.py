@@ -285,3 +285,17 @@ def test_as_many_rows_as_were_reserved_at_most(code, retract, monkeypatch):
     head = "G21 G90 G17 G94 F500 S100 M3\nG0 X0 Y0 Z10\n"
     few, many = (len(toolpath(f"{retract} G{code} X1 Z-1 R2 {words} L{n}", head)) for n in (1, 999))
     assert many - few >= 998 * 3
+
+
+@pytest.mark.parametrize("cycle", ["G89 X5. Z-4. R1. P500", "G84 X5. Z-4. R1."])
+def test_a_fanuc_feeds_up_to_r_and_rises_from_there_at_rapid_speed(cycle):
+    text = f"G21 G90 G17 G94\nS500 M3\nG0 X0. Y0. Z9.\nF120\n{{}}{cycle}\nG80\nM30\n"
+
+    def last(retract, dialect):
+        return read_stream(io.BytesIO(text.format(retract).encode()), "part.nc", dialect=dialect)
+
+    back = last("", "fanuc")
+    assert back.position_mm[-3:, 2].tolist() == [-4.0, 1.0, 9.0]
+    assert back.rapid[-3:].tolist() == [False, False, True]
+    at_r = last("G99 ", "fanuc")
+    assert at_r.position_mm[-2:, 2].tolist() == [-4.0, 1.0]

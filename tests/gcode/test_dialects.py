@@ -72,7 +72,7 @@ def test_a_table_is_whole(name):
         ("G99 G82 X5. Z-5. R1. P500 F100\nX8.\nG80\n", "G99 G82 X5 Z-5 R1 P0.5 F100\nX8\nG80\n"),
         (
             "G81 X5. Z-5. R1. F100\nG91 X2. Z-6. R-4. K3\nG80\n",
-            "G81 X5 Z-5 R1 F100\nG91 X2 Z-6 R-4 L3\nG80\n",
+            "G98\nG81 X5 Z-5 R1 F100\nG91 X2 Z-6 R-4 L3\nG80\n",
         ),
         ("G2 X10. Y0 R5. F100\n", "G2 X10 Y0 R5 F100\n"),
         ("G99 G81 X5. Z-5. R1. F100\nG80\nZ9.\n", "G99 G81 X5 Z-5 R1 F100\nG0 Z9\n"),
@@ -262,27 +262,6 @@ def test_heidenhain_as_a_dialect_says_the_same():
         read("G21\n", "okuma")
 
 
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
-        ("$H\nG21\nG0 X1 Y1 Z1\nM2\n", ["grbl"]),
-        ('G710 G90\nMSG("A")\nG0 X=1 Y1 Z1\nM30\n', ["sinumerik"]),
-        ("G21\nG50.1\nG0 X1. Y1. Z1.\nM30\n", ["fanuc", "fanuc-calculator", "fanuc-increments"]),
-    ],
-)
-def test_a_refusal_names_the_dialects_that_read_the_program(tmp_path, text, names):
-    part = tmp_path / "part.nc"
-    part.write_text(text)
-    with pytest.raises(NotUnderstoodError) as refused:
-        read_gcode(part)
-    last = refused.value.issues[-1]
-    assert last.code == "other-dialect"
-    assert [word for word in last.message.replace(";", "").split() if word in DIALECT_NAMES][:-1] == names
-    assert any(f"--dialect {names[0]} reads this" in issue.remedy for issue in refused.value.issues)
-    for name in names:
-        read_gcode(part, dialect=name)
-
-
 def test_a_line_that_no_dialect_reads_names_none(tmp_path):
     part = tmp_path / "part.nc"
     part.write_text("G21\nG0 X1. Y1. Z1.\nG999 X1.\nM30\n")
@@ -306,7 +285,19 @@ def test_programs_that_compute_or_jump_are_not_of_every_dialect(dialect, line):
 @pytest.mark.parametrize(
     "line",
     [
-        *("G4 P1.5", "G4 P500 X1.", "G10 L2 P1 X0.", "G92 X0. Y0.", "G41 D1", "G43.1 Z1.", "G59.1"),
+        *(
+            "G4 P1.5",
+            "G4 P500 X1.",
+            "G10 L2 P0 X0.",
+            "G10 L2 P7 X0.",
+            "G91 G10 L2 P1 X1.",
+            "G10 L10 P1 R5.",
+            "G10 L2 P1 R5.",
+            "G92 X0. Y0.",
+            "G41 D1",
+            "G43.1 Z1.",
+            "G59.1",
+        ),
         *("G95\nG1 X1. F20", "G93\nG1 X1. F20", "G20\nG1 X1. F10", "G82 X1. Z-1. R1. P0.5 F100"),
         "G83 X1. Z-1. R1. Q2000 F100",
     ],
@@ -320,3 +311,45 @@ def test_times_and_angles_have_their_own_increments():
     inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
     assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
     assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
+def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
+    text = "G21 G90\nG10 L2 P2 X10. Y-5. Z1.\nG55\nG0 X1. Y1. Z1.\nM30\n"
+    assert read(text, dialect).position_mm[-1].tolist() == [11.0, -4.0, 2.0]
+    assert "program-offset" not in {i.code for i in read(text, dialect).issues if i.severity == "error"}
+
+
+@pytest.mark.parametrize(
+    ("line", "dialect", "reason"),
+    [
+        ("G1 X5. ,R2. F100", "fanuc", "corner"),
+        ("G1 X5. , C1. F100", "fanuc-calculator", "corner"),
+        ("G1 X5 RND=2 F100", "sinumerik", "corner"),
+        ("G1 X5 CHF=1 F100", "sinumerik", "corner"),
+        ("G1 X5 CHR=1 F100", "sinumerik", "corner"),
+        ("G83 X5. Z-5. R1. Q2. F100 L0", "fanuc", "drill nothing"),
+        ("G81 X5. Z-5. R1. F100 K0", "fanuc", "drill nothing"),
+        ("G10 L10 P1 R5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G10 L2 P0 X5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G41 D1 G1 X5. F100", "fanuc", "leads in"),
+        ("MCALL CYCLE81(10,0,2,-8)", "sinumerik", "cycle"),
+        ('T="MILL" D1', "sinumerik", "tool by its name"),
+    ],
+)
+def test_what_is_not_carried_out_is_refused_with_its_own_reason(line, dialect, reason):
+    unit = "G710" if dialect == "sinumerik" else "G21"
+    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
+    assert [i.line for i in found] == [3]
+    assert reason in found[0].message
+    assert "--dialect" not in found[0].remedy
+
+
+def test_a_fanuc_program_that_leaves_g90_to_the_control_is_told():
+    def lines(text, dialect):
+        return [i.line for i in read(text, dialect).issues if i.code == "start-unnamed"]
+
+    assert lines("G21\nG0 X1. Y1. Z1.\nG90\nM30\n", "fanuc") == [2]
+    assert lines("G21 G90\nG0 X1. Y1. Z1.\nM30\n", "fanuc") == []
+    assert lines("G21\nG91 G28 Z0.\nG90 G0 X1. Y1. Z1.\nM30\n", "fanuc") == []
+    assert lines("G21\nG0 X1. Y1. Z1.\nM30\n", "linuxcnc") == []

@@ -329,3 +329,17 @@ def test_little_room_changes_nothing(monkeypatch):
     found = read(text)
     assert found.position_mm.tolist() == expected.position_mm.tolist()
     assert found.events == expected.events
+
+
+@pytest.mark.parametrize(
+    ("opening", "closing"),
+    [("if [1]", "endif"), ("while [1]", "endwhile"), ("repeat [3]", "endrepeat"), ("do", "while [1]")],
+)
+@pytest.mark.parametrize("label", ["<inner>", "<deep>", "100"])
+def test_a_return_leaves_its_subprogram_from_within_whatever_its_label_is(opening, closing, label):
+    """As LinuxCNC, which does not look at the label of a return."""
+    inside = f"o<inner> {opening}\nG1 X[#1]\no{label} return\no<inner> {closing}\n"
+    sub = f"o<deep> sub\n{inside}G1 X99\no<deep> endsub\n"
+    text = f"{sub}G21 G90\nG0 X0 Y0 Z0\nF500\no<deep> call [3]\no<deep> call [4]\nG1 Y7\nM2\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
+    assert toolpath.position_mm[-3:].tolist() == [[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 7.0, 0.0]]

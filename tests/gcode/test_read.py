@@ -207,3 +207,21 @@ def test_a_refused_program_leaves_no_thread_behind():
             read_stream(io.BytesIO(b"BEGIN PGM PART MM\nL X+10 R0 FMAX\n"), "part.h")
         kept.append(caught)
     assert threading.active_count() == before
+
+
+@pytest.mark.parametrize(
+    "arc", ["G2 X0.001 Y-7.5 I-0.001 J0", "G3 X0.002 Y-7.5 R0.0008", "G2 X0.001 Y-7.5 Z3 I-0.001"]
+)
+def test_an_arc_below_the_chord_tolerance_is_a_straight_move_with_a_note(arc):
+    text = f"G21 G90\nG0 X0.001 Y-7.5 Z5\n{arc} F600\nG1 X20\nM2\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
+    assert [i.code for i in toolpath.issues] == ["arc-small"]
+    assert len(toolpath) == 4
+    assert toolpath.position_mm[2, 2] == (3.0 if "Z3" in arc else 5.0)
+    assert toolpath.arc[2] == -1
+
+
+def test_a_larger_arc_is_never_flattened():
+    text = "G21 G90\nG0 X0.002 Y0 Z5\nG2 X0.002 Y0 I-0.002 F600\nM2\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
+    assert not [i for i in toolpath.issues if i.code == "arc-small"]

@@ -1,11 +1,15 @@
-"""Each remedy of a finding about characters, comments and line ends works when it is followed literally."""
+"""The remedies of the reader's findings work when they are followed literally."""
 
 import io
+import tomllib
+from pathlib import Path
 
 import pytest
 
 from gcode2krl import Gcode2KrlError
+from gcode2krl.gcode.findings import FINDINGS
 from gcode2krl.gcode.read import read_stream
+from tests.cells import over_demonstration
 
 HEAD, END = "G21\nG0 X0 Y0 Z5\n", "G0 X1\nM2\n"
 
@@ -79,3 +83,40 @@ def test_one_consequence_is_one():
 )
 def test_what_posts_write_is_read(text):
     assert not errors(text)
+
+
+REMEDIES = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
+BEFORE = {
+    "linuxcnc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
+    "fanuc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0. Y0. Z0.\nF500\n",
+    "sinumerik": "G710 G90 G17 G94\nG54\nT1 M6\nD1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
+}
+
+
+def outcome(entry, lines, cell):
+    """Return the codes of all findings of some lines behind a head, and the last place (none if refused)."""
+    dialect = entry.get("dialect", "linuxcnc")
+    head = "G21 G90 G17\n" if entry.get("whole") else BEFORE[dialect]
+    text = f"{head}{lines}\nM30\n"
+    try:
+        toolpath = read_stream(
+            io.BytesIO(text.encode()), "part.nc", over_demonstration(cell), dialect=dialect
+        )
+    except Gcode2KrlError as error:
+        return {issue.code for issue in error.issues}, None
+    return {i.code for i in toolpath.issues if i.severity != "note"}, toolpath.position_mm[-1].tolist()
+
+
+@pytest.mark.parametrize("code", REMEDIES["code"])
+def test_who_follows_a_remedy_gets_the_program_it_promises(code):
+    entry = REMEDIES["code"][code]
+    refused, _ = outcome(entry, entry["refused"], None)
+    assert code in refused
+    found, tip = outcome(entry, entry["mended"], entry.get("cell"))
+    assert code not in found
+    assert tip == pytest.approx(entry["tip"], abs=1e-9)
+
+
+def test_every_finding_of_the_reader_has_its_remedy_carried_out():
+    told = REMEDIES["code"].keys() | REMEDIES["elsewhere"].keys()
+    assert {finding.code for finding in FINDINGS.values()} == told

@@ -1,4 +1,4 @@
-"""Diameters that CAM comments name, against the cell's tools."""
+"""Diameters and changes that CAM comments name, against the cell's tools."""
 
 import io
 
@@ -6,7 +6,7 @@ import pytest
 
 from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream, tool_comments
-from gcode2krl.gcode.tool_comments import named_diameters
+from gcode2krl.gcode.tool_comments import named_tools
 
 CELL = resolve_cell({"based_on": "demonstration"})  # T1 is 16 mm wide, T6 10 mm
 BODY = "G21 G90 G17\nT{tool} M6\nS9000 M3\nG0 G43 H{tool} Z30\nG0 X0 Y0\nG1 Z-5 F600\nG0 Z30\nM5\nM30\n"
@@ -32,6 +32,7 @@ OTHERS = [
     "( End Mill {0.25 inch})",
     "(1/4 FLAT ENDMILL)",
     "; cutter diameter = 3.175",
+    "(Compensated Tool Path. Diameter: 4.0)",
 ]
 SAME_OR_SILENT = [
     "(T1 D=16. CR=0. - ZMIN=-5 - flat end mill)",
@@ -93,4 +94,50 @@ def test_lines_are_right_far_into_a_long_file():
 )
 def test_a_file_without_such_words_is_not_searched_line_by_line(line, monkeypatch):
     monkeypatch.setattr(tool_comments, "_COMMENT", None)  # whatever asks it fails
-    assert not list(named_diameters(line * 1000, 1))
+    assert not list(named_tools(line * 1000, 1))
+
+
+GRBL = "G17 G90 G21\n{first}\nM3 S10000\nG54\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F200\n{second}\nG1 X50\nG0 Z5\nM5\nM2\n"
+
+
+def changes_told(first, second, mounted):
+    cell = CELL.model_copy(update={"mounted_tool": mounted})
+    text = GRBL.format(first=first, second=second)
+    issues = read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect="grbl").issues
+    return [(i.line, i.remedy) for i in issues if i.code == "tool-not-changed"]
+
+
+def test_a_change_that_only_a_comment_names_is_no_change():
+    ((line, remedy),) = changes_told("( M6 T2 )", "", 1)
+    assert (line, "mounted_tool = 2" in remedy) == (2, True)
+    assert changes_told("( M6 T2 )", "", 2) == []
+    assert changes_told("( M6 T2 )", "", None) == []
+    assert changes_told("(T2 before)", "", 1) == []
+
+
+@pytest.mark.parametrize("mounted", [1, 2, 5])
+def test_a_second_tool_of_the_comments_is_never_cut_with_the_first(mounted):
+    ((_, remedy),) = changes_told("( M6 T2 )", "( M06 T5 )", mounted)
+    assert "one program a tool" in remedy
+
+
+def test_a_change_in_a_comment_beside_a_real_one():
+    assert changes_told("(M6 T2)\nT2 M6", "", 1) == []
+    assert changes_told("T2 M6", "(T5 M6)", 1)[0][0] == 8
+
+
+def test_a_diameter_behind_a_change_in_a_comment_is_that_tools():
+    said = list(named_tools(b"( M6 T2 )\n(Compensated Tool Path. Diameter: 4.0)\n", 1))
+    assert [(s.tool, s.value, s.is_change) for s in said] == [(2, 0.0, True), (2, 4.0, False)]
+
+
+def test_the_mounted_tool_is_the_one_of_h_until_a_change():
+    text = "G21 G90\nT1\nG0 X0 Y0\nG43 Z9 H{h}\nM2\n"
+    cell = CELL.model_copy(update={"mounted_tool": 1})
+
+    def codes(h, of_cell):
+        return {i.code for i in read_stream(io.BytesIO(text.format(h=h).encode()), "part.nc", of_cell).issues}
+
+    assert "h-differs" not in codes(1, cell)
+    assert "h-differs" in codes(6, cell)
+    assert "h-differs" in codes(1, CELL.model_copy(update={"mounted_tool": 6}))
