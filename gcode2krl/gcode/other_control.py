@@ -17,6 +17,8 @@ Reread = Callable[[str], Toolpath]
 _SAME_MM, _SAME = 1e-6, 1e-9
 _COUNTS = {"consequences", "more"}
 _POINTLESS = "decimal-point"
+_TAKEN_ALIKE = "a dwell counted twice, or a part of its unit"
+"""A Haas takes G4 P0.5 for half a second, as LinuxCNC does; no Fanuc takes it."""
 
 
 def with_other_control(
@@ -45,7 +47,10 @@ def doubts_of_control(toolpath: Toolpath, mark: Mark | None, dialect: str, rerea
     """Yield a warning where a program is read, and the control whose marks it has means something else."""
     if mark is None or dialect in mark.control.dialects:
         return
-    other, remaining = _read_as(mark, reread)
+    other, refused = _read_as(mark, reread)
+    remaining = tuple(issue for issue in refused if _TAKEN_ALIKE not in issue.message)
+    if refused and not remaining:
+        return
     if remaining and all(issue.code == _POINTLESS for issue in remaining):
         first = remaining[0]
         what = f"{_said(mark)}, where {first.message.partition(': ')[0]}; it is read as {dialect} reads it"

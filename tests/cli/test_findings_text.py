@@ -102,7 +102,7 @@ def test_a_terminal_is_told_how_to_learn_more(
 
 def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Every kind of bad line 300 times over: at most eight lines of a kind, twenty in all, then counts."""
-    kinds = ["G1 X[1+]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "G1 X1 X2", "G1 E5", "M66 P1"]
+    kinds = ["G1 X[1+]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "G1 X1 X2", "G1 Q5", "M66 P1"]
     part = _part(tmp_path, [f"{kind}" for k in range(30) for kind in kinds for _ in range(k % 3 + 1)])
     assert _run(part, "-o", str(tmp_path / "part.src")) == 2
     lines = capsys.readouterr().err.splitlines()

@@ -122,6 +122,7 @@ def test_a_fanuc_program_is_not_read_with_another_meaning(tmp_path, line, word):
 
 def test_where_both_read_the_same_nothing_is_said(tmp_path):
     assert not doubts(tmp_path, f"%\nO0001\n{MILL}G1 X5. F500.\n{END}%\n")
+    assert not doubts(tmp_path, f"%\nO0001\n{MILL}G4 P0.5\nG1 X5. F500.\n{END}%\n"), "as on a Haas"
     assert not doubts(tmp_path, f"(made for Grbl)\n{MILL}G1 X5. F500.\n{END}")
 
 
