@@ -170,8 +170,11 @@ def _case(kind: str, seed: int, i: int, names: Sequence[str]) -> Case:
 
 
 def _form(name: str, i: int, names: int) -> str:
-    """Return the form of the i-th single case: both in every round of all effects, another one each round."""
-    other = (i % names + i // names) % 5 < OTHER_IN_FIVE and has_other_form(name)
+    """Return the form of the i-th single case: both in every round of all effects, another one each round.
+
+    Where all axes have it alike the plant has one form.
+    """
+    other = (i % names + i // names) % 5 < OTHER_IN_FIVE and has_other_form(name) and "@" not in name
     return "other" if other else "same"
 
 

@@ -181,3 +181,9 @@ def test_a_cluster_hands_every_record_back(tmp_path, monkeypatch, capsys):
     assert made == [3, 2, 1]  # in the order in which they are ready, and each once
     assert blind.main([*options[:-1], "tcp://127.0.0.1:1", "--null", "4"]) == 2
     assert "no scheduler answers at tcp://127.0.0.1:1: nobody there" in capsys.readouterr().err
+
+
+def test_what_all_axes_have_alike_comes_in_its_one_form():
+    named = [case for case in cases.plan(1, {"single": 200}) if "@all" in case.effect]
+    assert len(named) > 8
+    assert {case.form for case in named} == {"same"}
