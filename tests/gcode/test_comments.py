@@ -433,7 +433,7 @@ def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
     import gcode_beside_rs274
 
-    monkeypatch.setattr(gcode_beside_rs274, "LONGEST_S", 1.0)
+    monkeypatch.setattr(gcode_beside_rs274, "LONGEST_S", 3.0)
     beside, difference = gcode_beside_rs274.Beside(tmp_path), gcode_beside_rs274.difference
     rng, tally = random.Random(7), {False: 0, True: 0}
     for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::40]:

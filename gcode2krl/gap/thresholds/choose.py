@@ -89,10 +89,10 @@ class ChooseThresholds:
     model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
     loud_p: float = convention(1e-3, "chance that so many loud moments fall where the command changes")
     loud_share: float = calibrated(
-        0.1,
+        0.25,
         range(20_000, 21_000),
-        "power of loud moments in step with the command over that of the noise beyond which it is a gap: "
-        "the sampling of sharp corners leaves up to .03 without one, a brake that settles 1.1",
+        "power of loud moments in step with the command over that of the noise beyond which it is a gap: the "
+        "sampling of sharp corners leaves up to .03, at the tip behind late commands .14, a brake that settles 1.1",
     )
     observable_share: float = convention(
         0.02, "an effect whose power nuisance leaves less of is not observable in that link"
