@@ -92,7 +92,7 @@ class ChooseThresholds:
         0.25,
         range(20_000, 21_000),
         "power of loud moments in step with the command over that of the noise beyond which it is a gap: the "
-        "sampling of sharp corners leaves up to .03, at the tip behind late commands .14, a brake that settles 1.1",
+        "sampling of corners leaves up to .03, at the tip behind late commands .14, a brake that settles 1.1",
     )
     observable_share: float = convention(
         0.02, "an effect whose power nuisance leaves less of is not observable in that link"
