@@ -7,15 +7,16 @@ from pathlib import Path
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.errors import input_error
+from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING, Link
+from gcode2krl.gap.beside.links import PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
+from gcode2krl.gap.beside.retiming import on_own_timing
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface
@@ -106,7 +107,9 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     context, slips, issues = set_up.context, set_up.slips, set_up.issues
     if set_up.is_final:
         return answer(context, slips, issues)
-    context = _with_data(with_controller_clocks(context, PATH))
+    context = with_controller_clocks(context, PATH)
+    context = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
+    context, issues = _with_data(context), [*issues, *_of_actual_joints(context)]
     rough = _rough(context)
     links = begin("links")
     for count, link in enumerate(SIGNALS):
@@ -122,6 +125,18 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     if surface is not None:
         context = context.with_judgement(surface)
     return answer(context, slips, issues)
+
+
+def _of_actual_joints(context: Context) -> list[Issue]:
+    """Return what a log without commanded joints costs, once for all runs."""
+    alone = [pair.name for pair in context.pairs if pair.has_actual_joints_alone]
+    if not alone:
+        return []
+    words = (
+        f"{', '.join(alone)}: no commanded joints: the actual ones are compared with the prediction's, path and "
+        "drives as one link (servo); a lag that all axes share is taken for the clock"
+    )
+    return [Issue("note", "joints-actual-alone", 0, words)]
 
 
 def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.gap.beside.clocks import fitted_offset
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import late_s
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -26,10 +27,11 @@ def retimed(pair: Pair) -> Pair:
     lengths differ by more than 2 % are not the same path: the pair is returned unchanged.
     """
     table = pair.run.controller
-    if table is None or table.q_cmd_rad is None or not np.isfinite(table.q_cmd_rad).all():
+    path_rad = None if table is None else table.path_rad
+    if table is None or path_rad is None or not np.isfinite(path_rad).all():
         return pair
     inputs, own_s = pair.inputs, pair.stamps(table)
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(table.q_cmd_rad, axis=0), axis=1))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_rad, axis=0), axis=1))])
     wanted = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(inputs.q_cmd_rad, axis=0), axis=1))])
     if (
         travelled[-1] <= 0.0
@@ -70,6 +72,30 @@ def refined(pair: Pair, path: "Link") -> Pair:
         smooth = np.convolve(padded, kernel, mode="valid")
         now = pair.inputs.time_s
         pair = _at_times(pair, now + np.interp(now, trace.time_s[moves], smooth))
+    return pair
+
+
+def on_own_timing(pair: Pair, servo: "Link") -> Pair:
+    """Return a pair of actual joints alone on the run's own timing; others as they are.
+
+    A constant offset is the clock's. Only lateness beyond what drives have is taken for timing: less would take
+    the lag of one axis with it.
+    """
+    if not pair.has_actual_joints_alone:
+        return pair
+    for again in (False, True):
+        traces = servo.traces([pair])
+        if not traces:
+            return pair
+        offset_s, deviation_s = fitted_offset(traces[0])
+        if np.isfinite(deviation_s):
+            pair = pair.later(servo.table, offset_s)
+            traces = servo.traces([pair])
+        late, moves = late_s(traces[0], traces[0].residual)
+        largest_s = float(np.quantile(np.abs(late[moves]), 0.95)) if moves.any() else 0.0
+        if again or largest_s < LIMITS.clock_large_s:
+            return pair
+        pair = refined(retimed(pair) if largest_s > LIMITS.retime_far_s else pair, servo)
     return pair
 
 

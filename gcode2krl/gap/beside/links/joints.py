@@ -18,7 +18,7 @@ from gcode2krl.gap.beside.instruments import (
     constants,
     play_start_columns,
 )
-from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.interpolation import cubic, nearest_rows
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.traces import joint_trace
 from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
@@ -119,21 +119,26 @@ class _DriveLink(Link):
 
 
 class ServoLink(_DriveLink):
-    """What the drives do of what was commanded: q_act - q_cmd."""
+    """What the drives do of what was commanded: q_act - q_cmd, of a log of q_act alone of what was planned."""
 
     name = "servo"
     signal = "joint_actual"
-    needs = "controller.csv with q1_cmd_deg … and q1_act_deg …"
+    needs = "controller.csv with q1_act_deg …, and q1_cmd_deg … or a prediction"
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
-        """Return q_act - q_cmd less a logged correction."""
+        """Return q_act - q_cmd less a logged correction; q_act itself where it is compared with the plan."""
         table = pair.run.controller
-        if table is None or table.q_act_rad is None or table.q_cmd_rad is None:
+        if table is None or table.q_act_rad is None:
+            return None
+        stated_deg = pair.run.head.noise.q_act_deg
+        sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
+        if pair.has_actual_joints_alone:
+            actual_rad = table.q_act_rad - logged_correction(pair, table)
+            return joint_trace(self, pair, table, actual_rad, "q_act_rad", None, base=base, sigma_rad=sigma_rad)
+        if table.q_cmd_rad is None:
             return None
         pair = pair.with_measured_joints("q_cmd")
         difference = table.q_act_rad - table.q_cmd_rad - logged_correction(pair, table)
-        stated_deg = pair.run.head.noise.q_act_deg
-        sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
         return joint_trace(
             self, pair, table, difference, "q_act_rad", "q_cmd_rad", base=base, sigma_rad=sigma_rad
         )
@@ -185,6 +190,9 @@ def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
     joints_rad[:, list(trace.columns)] = judged.fitted(
         trace, np.clip(stamps, trace.time_s[0], trace.time_s[-1])
     )
+    if pair.has_actual_joints_alone and trace.plus == "q_act_rad":
+        planned_rad = cubic(stamps, pair.inputs.time_s, pair.inputs.q_cmd_rad)
+        joints_rad[:, list(trace.columns)] -= planned_rad[:, list(trace.columns)]
     return replace(pair, fitted={**pair.fitted, trace.plus: joints_rad})
 
 
