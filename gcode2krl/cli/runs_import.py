@@ -135,11 +135,10 @@ def shown(guess: "Guess") -> list[str]:
 
 def _notes(guess: "Guess") -> list[str]:
     """Return what a person should know of the run: what was left out, and what is not there."""
-    from gcode2krl.runs.foreign import absences, sheets_of
+    from gcode2krl.runs.foreign import absences, sheets_of, told
 
-    left_out = [f"left out: {', '.join(guess.left_out)[:300]}"] if guess.left_out else []
     missing = absences(sheets_of(guess))
-    return [*guess.notes, *left_out, *([missing] if missing else [])]
+    return [*told(guess), *([missing] if missing else [])]
 
 
 def _record(guess: "Guess") -> list[dict[str, Any]]:

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
@@ -108,8 +110,9 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     if set_up.is_final:
         return answer(context, slips, issues)
     context = with_controller_clocks(context, PATH)
-    context = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
-    context, issues = _with_data(context), [*issues, *_of_actual_joints(context)]
+    on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
+    issues = [*issues, *_of_actual_joints(context, on_time)]
+    context = _with_data(on_time)
     rough = _rough(context)
     links = begin("links")
     for count, link in enumerate(SIGNALS):
@@ -127,16 +130,23 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     return answer(context, slips, issues)
 
 
-def _of_actual_joints(context: Context) -> list[Issue]:
-    """Return what a log without commanded joints costs, once for all runs."""
-    alone = [pair.name for pair in context.pairs if pair.has_actual_joints_alone]
+def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
+    """Return what logs without commanded joints cost, and which of them leave the planned times."""
+    pairs = [(a, b) for a, b in zip(planned.pairs, on_time.pairs, strict=True) if a.has_actual_joints_alone]
+    alone = [pair.name for pair, _ in pairs]
     if not alone:
         return []
+    late = []
+    for pair, timed in pairs:
+        moved_s = timed.inputs.time_s - pair.inputs.time_s
+        if (largest_s := float(np.ptp(moved_s))) > 0.0:
+            words = f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
+            late.append(Issue("warning", "joints-actual-alone", 0, words, "record the commanded joints for a cause"))
     words = (
         f"{', '.join(alone)}: no commanded joints: the actual ones are compared with the prediction's, path and "
         "drives as one link (servo); a lag that all axes share is taken for the clock"
     )
-    return [Issue("note", "joints-actual-alone", 0, words)]
+    return [Issue("note", "joints-actual-alone", 0, words), *late]
 
 
 def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:

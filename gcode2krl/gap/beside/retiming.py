@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.beside.clocks import fitted_offset
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import late_s
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ def refined(pair: Pair, path: "Link") -> Pair:
 def on_own_timing(pair: Pair, servo: "Link") -> Pair:
     """Return a pair of actual joints alone on the run's own timing; others as they are.
 
-    A constant offset is the clock's. Only lateness beyond what drives have is taken for timing: less would take
-    the lag of one axis with it.
+    A constant offset is the clock's: the median of those of the joints, so that the lag of one axis stays in it.
+    Only lateness beyond what drives have is taken for timing.
     """
     if not pair.has_actual_joints_alone:
         return pair
@@ -87,16 +87,29 @@ def on_own_timing(pair: Pair, servo: "Link") -> Pair:
         traces = servo.traces([pair])
         if not traces:
             return pair
-        offset_s, deviation_s = fitted_offset(traces[0])
-        if np.isfinite(deviation_s):
-            pair = pair.later(servo.table, offset_s)
-            traces = servo.traces([pair])
+        pair = pair.later(servo.table, _median_offset_s(traces[0]))
+        traces = servo.traces([pair])
         late, moves = late_s(traces[0], traces[0].residual)
         largest_s = float(np.quantile(np.abs(late[moves]), 0.95)) if moves.any() else 0.0
         if again or largest_s < LIMITS.clock_large_s:
             return pair
         pair = refined(retimed(pair) if largest_s > LIMITS.retime_far_s else pair, servo)
     return pair
+
+
+def _median_offset_s(trace: Trace) -> float:
+    """Return by how much the joints are late, as the median of what each of them shows alone."""
+    offset_s = 0.0
+    for _ in range(LIMITS.clock_steps):
+        on_time = replace(trace, time_s=trace.time_s - offset_s)
+        rate = on_time.rate - on_time.rate.mean(axis=0)
+        power = np.sum(rate**2, axis=0)
+        moves = power > LIMITS.timing_slow**2 * float(power.max(initial=0.0))
+        if not moves.any():
+            return offset_s
+        residual = on_time.residual - on_time.residual.mean(axis=0)
+        offset_s -= float(np.median(np.sum(rate * residual, axis=0)[moves] / power[moves]))
+    return offset_s
 
 
 def _at_times(pair: Pair, time_s: Floats) -> Pair:

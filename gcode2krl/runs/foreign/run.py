@@ -16,7 +16,7 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.frames import abc_from_rotation
 from gcode2krl.runs.diadem import is_data_set
 from gcode2krl.runs.folder import Run, assembled, load_run
-from gcode2krl.runs.foreign.guess import ORDERS, Guess, Predicted, by_layout, guessed, same_columns
+from gcode2krl.runs.foreign.guess import ORDERS, Entry, Guess, Predicted, by_layout, guessed, same_columns
 from gcode2krl.runs.foreign.names import FACTORS, kind_of
 from gcode2krl.runs.foreign.table import Table, read_table, table_of
 from gcode2krl.runs.head import Clocks, Layout, RunHead, read_head
@@ -32,11 +32,11 @@ _TABLES = {
     "force": r"[fm][xyz]",
 }
 _COSTS = (
-    ("q1_cmd", "commanded joints", "path and drives are judged as one, a lag of all axes is not told from a clock"),
-    ("q1_act", "actual joints", "the drives are not examined"),
-    ("q1_load", "encoders behind the gears", "gears are not examined"),
-    ("x", "an instrument at the tip", "the arm is not examined"),
-    ("fx", "forces", "the cut is not examined"),
+    ("q1_cmd", "commanded joints (path and drives are judged as one, a lag of all axes is taken for a clock)"),
+    ("q1_act", "actual joints (drives are not examined)"),
+    ("q1_load", "encoders behind the gears (gears are not examined)"),
+    ("x", "an instrument at the tip (the arm is not examined)"),
+    ("fx", "forces (the cut is not examined)"),
 )
 
 
@@ -189,7 +189,8 @@ def _abc(values: Floats, side: str, rotations: Any) -> dict[str, Floats]:
 def absences(sheets: Mapping[str, Sheet]) -> str:
     """Return what the tables do not hold and what each costs, on one line; "" where all is there."""
     there = {name.rpartition("_")[0] for sheet in sheets.values() for name in sheet.columns}
-    return "; ".join(f"no {what}: {cost}" for target, what, cost in _COSTS if target not in there)
+    missing = [what for target, what in _COSTS if target not in there]
+    return f"not in the log: {', '.join(missing)}" if missing else ""
 
 
 def write_run(guess: Guess, folder: Path, prediction: str = "") -> list[Path]:
@@ -284,22 +285,27 @@ def run_or_log(place: str | Path, prediction: Predicted | None = None, *, partia
         guess = guessed(table, prediction=prediction)
     guess.require_certain(f"gcode2krl runs import {path} -o {path.stem}/")
     run = run_of(guess, path.stem)
-    notes = (Issue("note", "run-layout", 0, text) for text in told(guess, run.name))
-    return _with_issues(run, tuple(notes))
+    remedy = f"`gcode2krl runs import {path}` shows why, and keeps it"
+    notes = [Issue("note", "run-layout", 0, text, remedy) for text in (_taken(guess), *told(guess))]
+    # what is missing is said by the links that need it
+    return replace(run, issues=(*notes, *(issue for issue in run.issues if issue.code != "trace-missing")))
 
 
-def _with_issues(run: Run, issues: tuple[Issue, ...]) -> Run:
-    return replace(run, issues=(*issues, *run.issues))
+def _taken(guess: Guess) -> str:
+    """Return on one line what the columns were taken for: those of one kind by their first and last."""
+    groups: dict[tuple[str, str], list[Entry]] = {}
+    for entry in guess.entries:
+        groups.setdefault((re.sub(r"\d", "", entry.target), entry.unit), []).append(entry)
+    parts = []
+    for (_, unit), entries in groups.items():
+        ends = entries if len(entries) == 1 else [entries[0], entries[-1]]
+        names, targets = (" … ".join(getattr(e, key) for e in ends) for key in ("name", "target"))
+        parts.append(f"{names} as {targets}{f' in {unit}' if unit != '1' else ''}")
+    return f"{guess.table.how}; {', '.join(parts)}"
 
 
-def told(guess: Guess, name: str) -> Iterator[str]:
-    """Yield what a guess took columns for, what it left out, and what is not there."""
-    taken = ", ".join(f"{entry.name} as {entry.target} in {entry.unit}" for entry in guess.entries)
-    yield f"{name}: {guess.table.how}; {taken}"
-    yield from (f"{name}: {note}" for note in guess.notes)
-    if guess.left_out:
-        yield f"{name}: left out: {', '.join(guess.left_out)[:300]}"
-    missing = absences(sheets_of(guess))
-    if missing:
-        yield f"{name}: {missing}"
+def told(guess: Guess) -> list[str]:
+    """Return what a guess left out, a line each."""
+    left_out = [f"left out: {', '.join(guess.left_out)[:300]}"] if guess.left_out else []
+    return [*guess.notes, *left_out]
 

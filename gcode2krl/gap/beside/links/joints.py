@@ -57,6 +57,14 @@ class PathLink(Link):
             self, pair, table, table.q_cmd_rad, "q_cmd_rad", None, base=base, sigma_rad=LIMITS.model_rad
         )
 
+    def motion(self, pair: Pair) -> Trace | None:
+        """Return the commanded joints, or without any the actual ones in their place: how far a run has come."""
+        table = pair.run.controller
+        if table is None or not pair.has_actual_joints_alone:
+            return self.trace(pair)
+        run = replace(pair.run, controller=replace(table, q_cmd_rad=table.q_act_rad))
+        return self.trace(replace(pair, run=run))
+
     def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
         """Return the commanded path, planned once for all runs of a prediction."""
         return trace.simulator.commanded(trace.inputs, applied)
