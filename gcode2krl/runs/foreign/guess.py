@@ -4,15 +4,15 @@ A unit or an order that none of these settles is a question, never an answer.
 """
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from gcode2krl.arrays import Floats
-from gcode2krl.errors import NotUnderstoodError, input_error
-from gcode2krl.runs.foreign.beside_plan import Plan, joint_fit, length_unit, time_units
+from gcode2krl.errors import input_error
+from gcode2krl.runs.foreign.beside_plan import JointFit, Plan, joint_fit, length_unit, time_units
 from gcode2krl.runs.foreign.names import FACTORS, Meaning, kind_of, meanings, unit_of
 from gcode2krl.runs.foreign.table import Table
 from gcode2krl.runs.head import Layout
@@ -25,6 +25,7 @@ ORDERS = {
     "rotvec": "",
 }
 """Order of the three angles of an orientation -> scipy's name: capitals turn about the axes as turned before."""
+_SAID = "you said so"
 _CYCLE_S = (2e-4, 0.5)
 """Shortest and longest step of a recording of a motion: 5 kHz to 2 Hz, our choice."""
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
@@ -110,6 +111,7 @@ def guessed(
     order: str = "",
     joints: str = "",
     prediction: Predicted | None = None,
+    said: str = _SAID,
 ) -> Guess:
     """Return what the columns of a table are.
 
@@ -120,6 +122,7 @@ def guessed(
     order : of the three angles of an orientation, a key of `ORDERS`.
     joints : numbers of the axes in the order in which the table counts its joints, ``"321456"``.
     prediction : what the run belongs to; it settles units and orders that names leave open.
+    said : who answers; only what a person says of this very table is never doubted.
 
     Raises
     ------
@@ -130,7 +133,7 @@ def guessed(
     _require_answers(table, columns, units, order, joints)
     known = meanings(table.columns)
     for name, given in columns.items():
-        known[name] = _given(given, table.source)
+        known[name] = _given(given, table.source, said)
     known = {name: m for name, m in known.items() if m.target}
     free = any(m.free_order for m in known.values()) and not joints
     if joints:
@@ -139,7 +142,7 @@ def guessed(
     seconds = next((table.columns[name] for name, m in known.items() if m.target == "t"), np.zeros(0))
     if (seconds % 1.0 != 0.0).any():  # parts of a second belong to whole ones only
         known = {name: m for name, m in known.items() if m.target != "t_fraction"}
-    work = _Work(table, known, units, Plan.of(prediction))
+    work = _Work(table, known, units, Plan.of(prediction), said)
     work.settle_time()
     work.settle_units()
     work.settle_joints(free, bool(columns) or bool(joints))
@@ -171,14 +174,14 @@ def _require_answers(
         raise input_error("run-layout", words, "say 321456 where A3 is the first", source=table.source)
 
 
-def _given(target: str, source: str) -> Meaning:
+def _given(target: str, source: str, said: str) -> Meaning:
     """Return the meaning that a person states: ``q1_act``, ``q1_act_rad``, or nothing."""
     if target in ("", "-"):
         return Meaning("")
     stem, _, last = target.rpartition("_")
     for name, unit in ((target, ""), (stem, unit_of(last))):
         if kind_of(name) and (not unit or unit in FACTORS[kind_of(name)]):
-            return Meaning(name, unit, "you said so")
+            return Meaning(name, unit, said)
     words = f"{target!r} is no column of a run"
     remedy = "t, q1_cmd … q6_cmd, q1_act …, q1_load …, x, y, z, x_act …, fx …; with a unit: q1_act_rad"
     raise input_error("run-layout", words, remedy, source=source)
@@ -206,6 +209,7 @@ class _Work:
     known: dict[str, Meaning]
     stated: dict[str, str]
     plan: Plan | None
+    said: str
     order: str = ""
     clock_s: float = 0.0
     questions: list[Question] = field(default_factory=list)
@@ -254,13 +258,16 @@ class _Work:
 
     def _doubt_time(self, name: str, values: Floats) -> None:
         """Ask where a stated unit makes steps that no recording has."""
-        unit, said = self.known[name].unit, bool(self.stated.get(name) or self.stated.get("time"))
-        fit = self._cycles(values)
-        if said or unit in fit or not fit or self.known[name].why == "you said so":
+        unit, fit = self.known[name].unit, self._cycles(values)
+        if unit in fit or not fit or self._is_sure(name):
             return
         cycle_s = _step(values) * FACTORS["time"][unit]
         words = f"{name}: in {unit} there are {cycle_s:.3g} s between rows; is it {' or '.join(fit)}?"
         self.questions.append(Question(words, f"--unit time={'|'.join([*fit, unit])}"))
+
+    def _is_sure(self, name: str) -> bool:
+        """Tell whether a person has said the unit of a column of this table."""
+        return self.known[name].why.endswith(_SAID)
 
     def _take_stated(self, names: Iterable[str], kind: str) -> None:
         """Take units that a person, a line of units or a stamp states."""
@@ -269,8 +276,8 @@ class _Work:
             line = self.table.units.get(name, "")
             if said:
                 self.known[name] = self.known[name]._replace(unit=said)
-                self.set_unit([name], said, "you said so")
-            elif line in FACTORS[kind] and self.known[name].why != "you said so":
+                self.set_unit([name], said, self.said)
+            elif line in FACTORS[kind] and not self.known[name].unit:
                 stamp = kind == "time" and name not in self.table.units
                 self.set_unit([name], line, "stamps" if stamp else "the table states the unit")
 
@@ -325,13 +332,13 @@ class _Work:
             return length_unit(values, self.plan)
         if not all(re.fullmatch(r"q\d_(cmd|act|load)", self.known[name].target) for name in names):
             return ""
-        fit = self._joint_fit(names)
+        fit = self._joint_fit(names, ("deg", "rad"))
         return fit.unit if fit is not None else ""
 
     def _doubt(self, names: list[str], kind: str) -> None:
         """Ask where the values contradict the unit that a name or an exporter states."""
         names = [name for name in names if name in self.known]
-        if not names or kind not in ("angle", "length") or self.known[names[0]].why.endswith("you said so"):
+        if not names or kind not in ("angle", "length") or self._is_sure(names[0]):
             return
         values = np.stack([self.table.columns[name] for name in names], axis=1)
         unit, largest = self.known[names[0]].unit, float(np.nanmax(np.abs(values), initial=0.0))
@@ -362,14 +369,13 @@ class _Work:
             passed = passed + fraction - fraction[np.isfinite(values)][0]
         return np.asarray(passed)
 
-    def _joint_fit(self, names: list[str]) -> Any:
+    def _joint_fit(self, names: list[str], units: Sequence[str]) -> JointFit | None:
         time_s = self.time_s()
         if time_s is None or self.plan is None or len(names) < 6:
             return None
         ordered = sorted(names, key=lambda name: self.known[name].target)
         values = np.stack([self.table.columns[name] for name in ordered], axis=1)
-        unit = self.known[ordered[0]].unit
-        return joint_fit(time_s, values, self.plan, FACTORS["angle"], [unit] if unit else ["deg", "rad"])
+        return joint_fit(time_s, values, self.plan, FACTORS["angle"], units)
 
     def settle_joints(self, free: bool, said: bool) -> None:
         """Compare the joints with those of the prediction: their order, their signs, and the clock."""
@@ -377,7 +383,7 @@ class _Work:
             names = [str(self.name_of(f"q{n}_{side}")) for n in range(1, 7)]
             if any(name == "None" or not self.known[name].unit for name in names):
                 continue
-            fit = self._joint_fit(names)
+            fit = self._joint_fit(names, (self.known[names[0]].unit,))
             if fit is None:
                 continue
             self.clock_s = fit.clock_s
@@ -448,13 +454,11 @@ def by_layout(table: Table, layout: Layout, prediction: Predicted | None = None)
     """Return the guess that an earlier ``run.toml`` keeps; no column but its own is read."""
     others = {name: "" for name in table.columns if name not in layout.columns}
     columns = {**layout.columns, **others}
-    guess = guessed(
-        table, columns=columns, units=layout.units, order=layout.order or "", prediction=prediction
+    return guessed(
+        table,
+        columns=columns,
+        units=layout.units,
+        order=layout.order or "",
+        prediction=prediction,
+        said="as in the run before",
     )
-    why = "as in the run before"
-    return replace(guess, entries=tuple(replace(entry, why=why) for entry in guess.entries))
-
-
-def refused(source: str, words: str, remedy: str) -> NotUnderstoodError:
-    """Return the error of a table that cannot become a run."""
-    return input_error("run-layout", words, remedy, source=source)
