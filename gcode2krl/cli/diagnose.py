@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         "gcode2krl diagnose prediction/ run-1/ run-2/",
         "gcode2krl diagnose prediction/ run-1/ run-2/ --holdout run-3/ --html gap.html",
         "gcode2krl diagnose --from-log run-1/",
+        "gcode2krl diagnose prediction/ my.csv",
     ),
 )
 @click.argument("folders", nargs=-1, required=True, metavar="[PREDICTION] RUN…")
@@ -55,7 +56,7 @@ def command(
 ) -> int:
     """Say where measured runs differ from their prediction, which effects explain it, and how far it shrinks.
 
-    A run is a folder, or a log of another program whose columns are certain; `gcode2krl runs import` shows them.
+    A run is a folder, or a log of another program if its columns are certain: see `gcode2krl runs import`.
     Without --holdout each run is held out in turn; with it, the runs it names only test. Exit code 0 whenever
     a diagnosis was made, whatever it found.
     """

@@ -27,10 +27,18 @@ if TYPE_CHECKING:
 )
 @click.argument("log", metavar="LOG")
 @click.option("-o", "--output", metavar="RUN", help="Folder of the run; default: the log's name beside it.")
-@click.option("--columns", multiple=True, metavar="NAME=OURS", help="What a column is; OURS empty: leave out.")
-@click.option("--unit", multiple=True, metavar="WHAT=UNIT", help="Unit of a column, or of time, angle, length …")
-@click.option("--order", default="", metavar="ORDER", help="Of an orientation: zyx, xyz, xyz-fixed, zyz, rotvec.")
-@click.option("--joints", default="", metavar="321456", help="Axes in the order in which the log counts joints.")
+@click.option(
+    "--columns", multiple=True, metavar="NAME=OURS", help="What a column is; OURS empty: leave out."
+)
+@click.option(
+    "--unit", multiple=True, metavar="WHAT=UNIT", help="Unit of a column, or of time, angle, length …"
+)
+@click.option(
+    "--order", default="", metavar="ORDER", help="Of an orientation: zyx, xyz, xyz-fixed, zyz, rotvec."
+)
+@click.option(
+    "--joints", default="", metavar="321456", help="Axes in the order in which the log counts joints."
+)
 @click.option("--prediction", metavar="FOLDER", help="Of the program that ran: settles units and orders.")
 @click.option("--like", metavar="RUN", help="Take the columns as in this run.  [default: a run beside RUN]")
 @click.option("--yes", is_flag=True, help="Ask nothing: the columns are right as they are shown.")
@@ -52,8 +60,8 @@ def command(
 ) -> int:
     """Make a run of a log: CSV of any separator, Parquet, MATLAB v5, an RSI log, a KRC trace.
 
-    It guesses what each column is and in which unit, and shows why. What it cannot know is a question, with the
-    option that answers it. run.toml keeps the answers: the next log with these columns needs none.
+    It guesses what each column is and in which unit, and shows why. What it cannot know is a question, with
+    the option that answers it. run.toml keeps the answers: the next log with these columns needs none.
     """
     console = Console(quiet, as_json)
     source = Path(log)
@@ -129,7 +137,9 @@ def shown(guess: "Guess") -> list[str]:
         (e.name[:40], e.target, f"{e.low:.6g}", f"{e.high:.6g}", e.unit or "?", e.why) for e in guess.entries
     ]
     widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(r, widths, strict=True)) for r in (head, *rows)]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(r, widths, strict=True)) for r in (head, *rows)
+    ]
     return [f"{guess.table.source}: {guess.table.how}", *(line.rstrip() for line in lines)]
 
 

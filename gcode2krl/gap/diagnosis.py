@@ -140,11 +140,15 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
     for pair, timed in pairs:
         moved_s = timed.inputs.time_s - pair.inputs.time_s
         if (largest_s := float(np.ptp(moved_s))) > 0.0:
-            words = f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
-            late.append(Issue("warning", "joints-actual-alone", 0, words, "record the commanded joints for a cause"))
+            words = (
+                f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
+            )
+            late.append(
+                Issue("warning", "joints-actual-alone", 0, words, "record the commanded joints for a cause")
+            )
     words = (
-        f"{', '.join(alone)}: no commanded joints: the actual ones are compared with the prediction's, path and "
-        "drives as one link (servo); a lag that all axes share is taken for the clock"
+        f"{', '.join(alone)}: no commanded joints: the actual ones are compared with the prediction's, path "
+        "and drives as one link (servo); a lag that all axes share is taken for the clock"
     )
     return [Issue("note", "joints-actual-alone", 0, words), *late]
 

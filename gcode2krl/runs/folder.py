@@ -118,7 +118,12 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
             return read_krc_trace(file, _gear_ratio(place, head))
         return read_rsi_log(file) if is_rsi_log(file) else _sheet(Controller)(file)
 
-    readers = {"controller": controller_sheet, "tracker": _sheet(Tracker), "force": _sheet(Force), "poses": read_poses}
+    readers = {
+        "controller": controller_sheet,
+        "tracker": _sheet(Tracker),
+        "force": _sheet(Force),
+        "poses": read_poses,
+    }
     sheets = {what: read(file) for what, read in readers.items() if (file := files[what]) is not None}
     traced = files["controller"] is not None and is_data_set(files["controller"])  # angles of the drives
     scan = read_scan(files["scan"]) if files["scan"] else None
@@ -158,9 +163,7 @@ def _sheet(kind: type[Measured]) -> Callable[[Path], Sheet]:
     return lambda file: read_sheet(file, columns_of(kind))
 
 
-def _table(
-    kind: type[AnyMeasured], sheet: Sheet | None, head: RunHead, partial: bool
-) -> AnyMeasured | None:
+def _table(kind: type[AnyMeasured], sheet: Sheet | None, head: RunHead, partial: bool) -> AnyMeasured | None:
     if sheet is None:
         return None
     clock_s = getattr(head.clocks, f"{kind.__name__.lower()}_s", 0.0)

@@ -118,7 +118,7 @@ class Controller(Measured):
 
     @property
     def path_rad(self) -> Floats | None:
-        """Return the joints (n, 6) that show how far a run has come: commanded, where these lack the actual."""
+        """Return the joints (n, 6) that show how far a run has come: the commanded, else the actual ones."""
         return self.q_act_rad if self.q_cmd_rad is None else self.q_cmd_rad
 
     @property

@@ -51,7 +51,9 @@ def test_the_record_has_the_columns_and_the_files(log, capsys):
 
 
 def test_what_is_not_there_is_said_with_what_it_costs(log, capsys):
-    (log / "tip.csv").write_bytes(text(["t_s", "x_mm", "y_mm", "z_mm", "note"], [TIME_S, *P.T, ["a"] * len(P)]))
+    (log / "tip.csv").write_bytes(
+        text(["t_s", "x_mm", "y_mm", "z_mm", "note"], [TIME_S, *P.T, ["a"] * len(P)])
+    )
     assert run_command(["runs", "import", "tip.csv"]) == 0
     out = "".join(capsys.readouterr())
     assert "left out: note" in out

@@ -26,7 +26,7 @@ def joints_deg(time_s):
 
 
 def position_mm(time_s):
-    return maker.path(time_s) + [900.0, -150.0, 800.0]
+    return maker.path(time_s) + np.array([900.0, -150.0, 800.0])
 
 
 def force_N(time_s):
@@ -96,24 +96,43 @@ LAYOUTS = (
         "KUKA trace as CSV, German Excel",
         lambda: text(
             ["Zeit [ms]", *numbered("AxisPos_CmdIpo{} [°]"), *numbered("AxisPos_Act{} [°]")],
-            [TIME_S * 1e3, *Q.T, *Q.T], ";", ",",
+            [TIME_S * 1e3, *Q.T, *Q.T],
+            ";",
+            ",",
         ),
         ("q_cmd", "q_act"),
     ),
     Layout(
         "KUKA drives in cp1252",
-        lambda: text(
-            ["Zeit", *numbered("Sollposition A{}"), *numbered("Istposition A{}"), *numbered("Iststrom A{}")],
-            [TIME_S, *Q.T, *Q.T, *(0.1 * Q.T)], ";", ",", units=";".join(["s", *["°"] * 12, *["A"] * 6]),
-        ).decode().encode("cp1252"),
+        lambda: (
+            text(
+                [
+                    "Zeit",
+                    *numbered("Sollposition A{}"),
+                    *numbered("Istposition A{}"),
+                    *numbered("Iststrom A{}"),
+                ],
+                [TIME_S, *Q.T, *Q.T, *(0.1 * Q.T)],
+                ";",
+                ",",
+                units=";".join(["s", *["°"] * 12, *["A"] * 6]),
+            )
+            .decode()
+            .encode("cp1252")
+        ),
         ("q_cmd", "q_act"),
     ),
     Layout(
         "RSI logger, one line a telegram",
         lambda: text(
-            ["IPOC", *(f"RIst.{x}" for x in "XYZ"), *(f"AIPos.A{n}" for n in range(1, 7)),
-             *(f"ASPos.A{n}" for n in range(1, 7))],
-            [np.round(TIME_S * 1e3 + 4_208_100_000.0), *P.T, *Q.T, *Q.T], form="{:.12g}",
+            [
+                "IPOC",
+                *(f"RIst.{x}" for x in "XYZ"),
+                *(f"AIPos.A{n}" for n in range(1, 7)),
+                *(f"ASPos.A{n}" for n in range(1, 7)),
+            ],
+            [np.round(TIME_S * 1e3 + 4_208_100_000.0), *P.T, *Q.T, *Q.T],
+            form="{:.12g}",
         ),
         ("q_cmd", "q_act", "xyz_act"),
     ),
@@ -121,7 +140,9 @@ LAYOUTS = (
         "RSI logger of ours with ; and tabs in names",
         lambda: text(
             ["Receive.IPOC", *(f"Receive.AIPos.A{n}" for n in range(1, 7))],
-            [np.round(TIME_S * 1e3 + 4_208_100_000.0), *Q.T], ";", form="{:.12g}",
+            [np.round(TIME_S * 1e3 + 4_208_100_000.0), *Q.T],
+            ";",
+            form="{:.12g}",
         ),
         ("q_act",),
     ),
@@ -129,8 +150,12 @@ LAYOUTS = (
         "rostopic echo -p of joint_states",
         lambda: text(
             ["%time", "field.header.seq", "field.header.stamp", *numbered("field.position{}", 0)],
-            [[f"{(t + EPOCH_S) * 1e9:.0f}" for t in TIME_S], [str(k) for k in range(len(TIME_S))],
-             [f"{(t + EPOCH_S) * 1e9:.0f}" for t in TIME_S], *R(Q).T],
+            [
+                [f"{(t + EPOCH_S) * 1e9:.0f}" for t in TIME_S],
+                [str(k) for k in range(len(TIME_S))],
+                [f"{(t + EPOCH_S) * 1e9:.0f}" for t in TIME_S],
+                *R(Q).T,
+            ],
         ),
         ("q_act",),
         answers={"joints": "123456"},
@@ -139,8 +164,12 @@ LAYOUTS = (
         "bagpy, UR driver's order of joints",
         lambda: text(
             ["Time", "header.stamp.secs", "header.stamp.nsecs", *numbered("position_{}", 0)],
-            [[f"{t + EPOCH_S:.6f}" for t in TIME_S], [f"{int(t + EPOCH_S)}" for t in TIME_S],
-             [f"{(t % 1) * 1e9:.0f}" for t in TIME_S], *R(Q)[:, [2, 1, 0, 3, 4, 5]].T],
+            [
+                [f"{t + EPOCH_S:.6f}" for t in TIME_S],
+                [f"{int(t + EPOCH_S)}" for t in TIME_S],
+                [f"{(t % 1) * 1e9:.0f}" for t in TIME_S],
+                *R(Q)[:, [2, 1, 0, 3, 4, 5]].T,
+            ],
         ),
         ("q_act",),
         answers={"joints": "321456"},
@@ -149,8 +178,12 @@ LAYOUTS = (
     Layout(
         "PlotJuggler, wrench and joints by name",
         lambda: text(
-            ["__time", *(f"/joint_states/joint_a{n}/position" for n in range(1, 7)),
-             *(f"/ft/wrench/force/{x}" for x in "xyz"), "/joint_states/joint_a1/velocity"],
+            [
+                "__time",
+                *(f"/joint_states/joint_a{n}/position" for n in range(1, 7)),
+                *(f"/ft/wrench/force/{x}" for x in "xyz"),
+                "/joint_states/joint_a1/velocity",
+            ],
             [[f"{t + EPOCH_S:.6f}" for t in TIME_S], *R(Q).T, *F.T, TIME_S],
         ),
         ("q_act", "force"),
@@ -158,10 +191,23 @@ LAYOUTS = (
     Layout(
         "UR RTDE client, blanks",
         lambda: text(
-            ["timestamp", *numbered("target_q_{}", 0), *numbered("actual_q_{}", 0),
-             *numbered("actual_TCP_pose_{}", 0), *numbered("actual_TCP_force_{}", 0)],
-            [TIME_S + 5123.0, *R(Q).T, *R(Q).T, *(P.T / 1e3),
-             *Rotation.from_euler("ZYX", ABC_DEG, degrees=True).as_rotvec().T, *F.T, *(0.1 * F.T)], " ",
+            [
+                "timestamp",
+                *numbered("target_q_{}", 0),
+                *numbered("actual_q_{}", 0),
+                *numbered("actual_TCP_pose_{}", 0),
+                *numbered("actual_TCP_force_{}", 0),
+            ],
+            [
+                TIME_S + 5123.0,
+                *R(Q).T,
+                *R(Q).T,
+                *(P.T / 1e3),
+                *Rotation.from_euler("ZYX", ABC_DEG, degrees=True).as_rotvec().T,
+                *F.T,
+                *(0.1 * F.T),
+            ],
+            " ",
         ),
         ("q_cmd", "q_act", "xyz_act", "force"),
         orientation="abc_act",
@@ -169,8 +215,16 @@ LAYOUTS = (
     Layout(
         "UR joints by name, radians unstated",
         lambda: text(
-            ["timestamp", "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
-             "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"], [TIME_S, *R(Q).T],
+            [
+                "timestamp",
+                "shoulder_pan_joint",
+                "shoulder_lift_joint",
+                "elbow_joint",
+                "wrist_1_joint",
+                "wrist_2_joint",
+                "wrist_3_joint",
+            ],
+            [TIME_S, *R(Q).T],
         ),
         ("q_act",),
         answers={"units": {"angle": "rad"}},
@@ -178,9 +232,19 @@ LAYOUTS = (
     Layout(
         "ABB, jointtarget and robtarget with a quaternion",
         lambda: text(
-            ["t_ms", *numbered("robax.rax_{}"), "trans.x", "trans.y", "trans.z",
-             "rot.q1", "rot.q2", "rot.q3", "rot.q4"],
-            [TIME_S * 1e3, *Q.T, *P.T, *QUATERNION[:, [3, 0, 1, 2]].T], "\t",
+            [
+                "t_ms",
+                *numbered("robax.rax_{}"),
+                "trans.x",
+                "trans.y",
+                "trans.z",
+                "rot.q1",
+                "rot.q2",
+                "rot.q3",
+                "rot.q4",
+            ],
+            [TIME_S * 1e3, *Q.T, *P.T, *QUATERNION[:, [3, 0, 1, 2]].T],
+            "\t",
         ),
         ("q_act", "xyz_act"),
         orientation="abc_act",
@@ -188,7 +252,9 @@ LAYOUTS = (
     Layout(
         "ABB signal analyser, stamps",
         lambda: text(
-            ["Time", *(f"ROB_1.Axis{n} (deg)" for n in range(1, 7))], [stamps(), *Q.T], ",",
+            ["Time", *(f"ROB_1.Axis{n} (deg)" for n in range(1, 7))],
+            [stamps(), *Q.T],
+            ",",
             above="TestSignal Export\nController;IRC5\n\n",
         ),
         ("q_act",),
@@ -226,8 +292,10 @@ LAYOUTS = (
     ),
     Layout(
         "Parquet of a data lake",
-        lambda: parquet({"stamp": np.datetime64("2024-05-06T07:08:09") + (TIME_S * 1e6).astype("timedelta64[us]")}
-                        | dict(zip(numbered("joint_{}_rad"), R(Q).T, strict=True))),
+        lambda: parquet(
+            {"stamp": np.datetime64("2024-05-06T07:08:09") + (TIME_S * 1e6).astype("timedelta64[us]")}
+            | dict(zip(numbered("joint_{}_rad"), R(Q).T, strict=True))
+        ),
         ("q_act",),
         ".parquet",
     ),
@@ -246,10 +314,15 @@ LAYOUTS = (
     ),
     Layout(
         "pose with roll, pitch, yaw beside joints, UTF-16",
-        lambda: text(
-            ["Time(ms)", *numbered("A{} (deg)"), "X(mm)", "Y(mm)", "Z(mm)", "roll", "pitch", "yaw"],
-            [TIME_S * 1e3, *Q.T, *P.T, *ABC_DEG[:, ::-1].T], "\t",
-        ).decode().encode("utf-16"),
+        lambda: (
+            text(
+                ["Time(ms)", *numbered("A{} (deg)"), "X(mm)", "Y(mm)", "Z(mm)", "roll", "pitch", "yaw"],
+                [TIME_S * 1e3, *Q.T, *P.T, *ABC_DEG[:, ::-1].T],
+                "\t",
+            )
+            .decode()
+            .encode("utf-16")
+        ),
         ("q_act", "xyz_act"),
         ".txt",
     ),

@@ -41,7 +41,9 @@ def test_a_log_alone_is_right_or_asked_about(layout, tmp_path):
     run = run_from(file, **layout.answers)
     assert_right(run, layout)
     tables = [t for t in (run.controller, run.tracker, run.force) if t is not None]
-    assert all(0.9 < np.median(np.diff(t.time_s)) / (0.0005 if "kHz" in layout.name else 0.012) < 1.1 for t in tables)
+    assert all(
+        0.9 < np.median(np.diff(t.time_s)) / (0.0005 if "kHz" in layout.name else 0.012) < 1.1 for t in tables
+    )
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=NAMES)
@@ -54,10 +56,14 @@ def test_a_prediction_answers_what_names_leave_open(layout, tmp_path):
         assert_right(run_from(file, prediction=PREDICTION), layout)
 
 
+COMMAS = [f"0,0{k:02d},1,5,2,5,3,5,4,5,5,5,6,5" for k in range(30)]
+
+
 def table(rows, header="Time,Axis1,Axis2,Axis3,Axis4,Axis5,Axis6"):
     return "\n".join([header, *rows, ""]).encode()
 
 
+AXES = "Axis1,Axis2,Axis3,Axis4,Axis5,Axis6"
 ROWS = [",".join(f"{v:.6g}" for v in (0.012 * k, *Q[k])) for k in range(60)]
 HOSTILE = {
     "empty": (b"", "trace-empty"),
@@ -68,17 +74,17 @@ HOSTILE = {
     "damaged Parquet": (b"PAR1" + b"\xff" * 300 + b"PAR1", "trace-unreadable"),
     "prose": (b"Dear all,\nplease find the log attached.\nBest\n" * 5, "trace-unreadable"),
     "header alone": (table([]), "trace-unreadable"),
-    "decimal comma between commas": (table([f"0,0{k:02d},1,5,2,5,3,5,4,5,5,5,6,5" for k in range(30)]), "trace-unreadable"),
+    "decimal comma between commas": (table(COMMAS), "trace-unreadable"),
     "comma and point": (
         table([row.replace(",", ";").replace(".", "," if k % 2 else ".") for k, row in enumerate(ROWS)]),
         "trace-number",
     ),
     "thousands": (table([f"{k},1.234,5,1,1,1,1" for k in range(30)], "Time;Axis1"), "run-layout"),
-    "a word in a number's place": (table([*ROWS[:30], ROWS[30].replace(",", ",ERR", 1), *ROWS[31:]]), "trace-number"),
+    "a word": (table([*ROWS[:30], ROWS[30].replace(",", ",ERR", 1), *ROWS[31:]]), "trace-number"),
     "a name twice": (table(ROWS, "Time,Axis1,Axis1,Axis3,Axis4,Axis5,Axis6"), "trace-column"),
     "no header": ("\n".join(ROWS).encode(), "run-layout"),
-    "no time": (table([row.partition(",")[2] for row in ROWS], "Axis1,Axis2,Axis3,Axis4,Axis5,Axis6"), "run-layout"),
-    "speeds and currents only": (table(ROWS, "Time," + ",".join(f"Speed A{k}" for k in range(1, 7))), "run-layout"),
+    "no time": (table([row.partition(",")[2] for row in ROWS], AXES), "run-layout"),
+    "speeds and currents only": (table(ROWS, "Time," + AXES.replace("Axis", "Speed A")), "run-layout"),
     "five axes": (table([row.rpartition(",")[0] for row in ROWS], "Time,J1,J2,J3,J4,J5"), ""),
     "time goes back": (table([*ROWS[30:], *ROWS[:30]]), "trace-time"),
     "gradians": (table(ROWS, "Time," + ",".join(f"Axis{k} [rad]" for k in range(1, 7))), "run-layout"),
@@ -142,7 +148,9 @@ def test_swapped_and_wrongly_united_columns_are_asked_about_beside_a_prediction(
     swapped = columns | {"J2_deg": columns["J3_deg"], "J3_deg": columns["J2_deg"]}
     assert [q.option for q in guess_of(swapped, prediction=PREDICTION).questions] == ["--joints 132456"]
     np.testing.assert_allclose(
-        np.degrees(run_from(swapped, joints="132456", prediction=PREDICTION).controller.q_act_rad), Q, atol=1e-6
+        np.degrees(run_from(swapped, joints="132456", prediction=PREDICTION).controller.q_act_rad),
+        Q,
+        atol=1e-6,
     )
     small = {name: values if name == "time_s" else np.radians(values) for name, values in columns.items()}
     questions = guess_of(small, prediction=PREDICTION).questions

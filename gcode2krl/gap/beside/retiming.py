@@ -78,7 +78,7 @@ def refined(pair: Pair, path: "Link") -> Pair:
 def on_own_timing(pair: Pair, servo: "Link") -> Pair:
     """Return a pair of actual joints alone on the run's own timing; others as they are.
 
-    A constant offset is the clock's: the median of those of the joints, so that the lag of one axis stays in it.
+    A constant offset is the clock's: the median of those of the joints, so that the lag of one axis stays.
     Only lateness beyond what drives have is taken for timing.
     """
     if not pair.has_actual_joints_alone:

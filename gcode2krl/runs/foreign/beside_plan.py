@@ -57,8 +57,8 @@ def joint_fit(
 ) -> JointFit | None:
     """Return how columns (n, 6) fit the predicted joints; None where the motion is another one.
 
-    Clocks are found whatever the unit and order (an affine map); then each column is compared with each joint,
-    levels included, and columns are assigned to joints by the least sum of squares.
+    Clocks are found whatever the unit and order (an affine map); then each column is compared with each
+    joint, levels included, and columns are assigned to joints by the least sum of squares.
     """
     good = np.isfinite(values).all(axis=1) & np.isfinite(time_s)
     if plan.q_deg is None or np.count_nonzero(good) < 10 or not np.isfinite(plan.q_deg).all():

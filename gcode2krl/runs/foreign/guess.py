@@ -24,7 +24,7 @@ ORDERS = {
     "zyz": "ZYZ",
     "rotvec": "",
 }
-"""Order of the three angles of an orientation -> scipy's name: capitals turn about the axes as turned before."""
+"""Order of the three angles of an orientation -> scipy's name; capitals turn about turned axes."""
 _SAID = "you said so"
 _CYCLE_S = (2e-4, 0.5)
 """Shortest and longest step of a recording of a motion: 5 kHz to 2 Hz, our choice."""
@@ -39,9 +39,12 @@ class Predicted(Protocol):
     """A prediction, as far as a table is compared with it."""
 
     @property
-    def motion(self) -> Any: ...
+    def motion(self) -> Any:
+        """Its `Motion`, None where there is none."""
+
     @property
-    def joints(self) -> Any: ...
+    def joints(self) -> Any:
+        """Its `Joints`, None where there are none."""
 
 
 @dataclass(frozen=True)
@@ -345,14 +348,18 @@ class _Work:
         if not unit:
             return
         size = FACTORS[kind][unit]
-        most = _BEYOND_RAD * FACTORS["angle"]["rad"] if kind == "angle" else _BEYOND_M * FACTORS["length"]["m"]
+        most = (
+            _BEYOND_RAD * FACTORS["angle"]["rad"] if kind == "angle" else _BEYOND_M * FACTORS["length"]["m"]
+        )
         usual = "deg|rad" if kind == "angle" else "mm|m"
         planned = self._by_plan(names, kind)
         if largest * size > most:
             words = f"{names[0]} … {names[-1]}: up to {largest:.4g} {unit}, which no robot has"
             self.questions.append(Question(words, f"--unit {kind}={usual}"))
         elif planned and planned != unit:
-            words = f"{names[0]} … {names[-1]}: stated in {unit}, but they move as the prediction in {planned}"
+            words = (
+                f"{names[0]} … {names[-1]}: stated in {unit}, but they move as the prediction in {planned}"
+            )
             self.questions.append(Question(words, f"--unit {kind}={planned}|{unit}"))
 
     def time_s(self) -> Floats | None:
@@ -411,7 +418,8 @@ class _Work:
     def require_something(self) -> None:
         """Ask for columns where nothing of the table can be compared."""
         if not any(_NEEDED.fullmatch(m.target) for m in self.known.values() if m.target != "t"):
-            words = f"no column is a joint, a position or a force; the file has {', '.join(self.table.names)[:300]}"
+            names = ", ".join(self.table.names)[:300]
+            words = f"no column is a joint, a position or a force; the file has {names}"
             self.questions.append(Question(words, "--columns NAME=q1_act …"))
 
     def guess(self) -> Guess:

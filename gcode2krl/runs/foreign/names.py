@@ -1,4 +1,4 @@
-"""What a column of another exporter is, by its name: ``exporters.toml`` has the names and where they come from."""
+"""What a column of another exporter is, by its name: ``exporters.toml`` has the names and their sources."""
 
 import re
 import tomllib

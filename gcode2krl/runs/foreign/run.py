@@ -1,4 +1,4 @@
-"""From a table of another exporter to a run: in memory, or as a folder that later tables of the kind follow."""
+"""From a table of another exporter to a run: in memory, or as a folder that later tables follow."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -32,7 +32,10 @@ _TABLES = {
     "force": r"[fm][xyz]",
 }
 _COSTS = (
-    ("q1_cmd", "commanded joints (path and drives are judged as one, a lag of all axes is taken for a clock)"),
+    (
+        "q1_cmd",
+        "commanded joints (path and drives are judged as one, a lag of all axes is taken for a clock)",
+    ),
     ("q1_act", "actual joints (drives are not examined)"),
     ("q1_load", "encoders behind the gears (gears are not examined)"),
     ("x", "an instrument at the tip (the arm is not examined)"),
@@ -90,8 +93,7 @@ def run_from(
     native = _native(source) if isinstance(source, (str, Path)) else None
     if native is not None:
         return _assembled(name or Path(source).stem, Path(source).parent, RunHead(), {"controller": native})
-    answers = {"columns": columns, "units": units, "order": order, "joints": joints, "prediction": prediction}
-    guess = guess_of(source, **answers)
+    guess = guess_of(source, columns=columns, units=units, order=order, joints=joints, prediction=prediction)
     guess.require_certain()
     return run_of(guess, name or (Path(source).stem if isinstance(source, (str, Path)) else "run"))
 
@@ -106,7 +108,9 @@ def _assembled(name: str, place: Path, head: RunHead, sheets: Mapping[str, Sheet
 
 
 def _some_joints(sheet: Sheet) -> bool:
-    return any(0 < sum(f"q{n}_{side}_deg" in sheet.columns for n in range(1, 7)) < 6 for side in ("cmd", "act"))
+    return any(
+        0 < sum(f"q{n}_{side}_deg" in sheet.columns for n in range(1, 7)) < 6 for side in ("cmd", "act")
+    )
 
 
 def _native(path: str | Path) -> Sheet | None:
@@ -130,7 +134,9 @@ def sheets_of(guess: Guess) -> dict[str, Sheet]:
     time_s = _stamps(columns)
     made: dict[str, Sheet] = {}
     for table, pattern in _TABLES.items():
-        chosen = {_column(target): values for target, values in columns.items() if re.fullmatch(pattern, target)}
+        chosen = {
+            _column(target): values for target, values in columns.items() if re.fullmatch(pattern, target)
+        }
         if chosen and time_s is not None:
             there = {"t_s": time_s, **{name: v for name, v in chosen.items() if v is not None}}
             made[table] = Sheet(there, tuple(there), guess.table.first_row, guess.table.source)
@@ -179,7 +185,9 @@ def _turns(order: str) -> Any:
 
 def _abc(values: Floats, side: str, rotations: Any) -> dict[str, Floats]:
     """Return the columns A, B, C in degrees; NaN where a value is missing or a quaternion is none."""
-    good = np.isfinite(values).all(axis=1) & (np.linalg.norm(values, axis=1) > 0.0 if values.shape[1] == 4 else True)
+    good = np.isfinite(values).all(axis=1) & (
+        np.linalg.norm(values, axis=1) > 0.0 if values.shape[1] == 4 else True
+    )
     abc = np.full((len(values), 3), np.nan)
     if good.any():
         abc[good] = abc_from_rotation(rotations(values[good]).as_matrix()) * DEG_PER_RAD
@@ -196,7 +204,7 @@ def absences(sheets: Mapping[str, Sheet]) -> str:
 def write_run(guess: Guess, folder: Path, prediction: str = "") -> list[Path]:
     """Write a guess without questions as a run folder; return its files.
 
-    Raises `NotUnderstoodError` where the folder already holds a run, cannot be written, or is none that loads.
+    Raises `NotUnderstoodError` where the folder holds a run or cannot be written, or it would not load.
     """
     guess.require_certain()
     sheets = sheets_of(guess)
@@ -245,7 +253,9 @@ def _written(head: dict[str, Any], sheets: Mapping[str, Sheet], folder: Path) ->
         (folder / "run.toml").write_text(tomli_w.dumps(head), encoding="utf-8")
     except OSError as error:
         words = f"cannot be written: {error.strerror}"
-        raise input_error("output-unwritable", words, "check path, rights and space", source=str(folder)) from None
+        raise input_error(
+            "output-unwritable", words, "check path, rights and space", source=str(folder)
+        ) from None
     return [folder / "run.toml", *written]
 
 
@@ -271,6 +281,7 @@ def run_or_log(place: str | Path, prediction: Predicted | None = None, *, partia
     Raises `NotUnderstoodError` as `load_run`; for a log that leaves questions with the command that answers.
     """
     path = Path(place)
+    name = path.resolve().stem
     if path.is_dir() and not (path / "run.toml").exists() and (path / "motion.parquet").is_file():
         path = path / "motion.parquet"
     if not path.is_file():
@@ -284,7 +295,7 @@ def run_or_log(place: str | Path, prediction: Predicted | None = None, *, partia
     else:
         guess = guessed(table, prediction=prediction)
     guess.require_certain(f"gcode2krl runs import {path} -o {path.stem}/")
-    run = run_of(guess, path.stem)
+    run = run_of(guess, name)
     remedy = f"`gcode2krl runs import {path}` shows why, and keeps it"
     notes = [Issue("note", "run-layout", 0, text, remedy) for text in (_taken(guess), *told(guess))]
     # what is missing is said by the links that need it
@@ -308,4 +319,3 @@ def told(guess: Guess) -> list[str]:
     """Return what a guess left out, a line each."""
     left_out = [f"left out: {', '.join(guess.left_out)[:300]}"] if guess.left_out else []
     return [*guess.notes, *left_out]
-

@@ -213,13 +213,13 @@ def _shape(lines: list[str], separator: str, file: Path) -> _Shape | None:
     score = sum(1 if _is_value(cell) else -1 for cell in below if cell) / max(len(rows) - first, 1)
     if commas and points and separator != ",":
         words = "numbers with a decimal comma and numbers with a point"
-        raise input_error("trace-number", words, "export it with one of them", line=first + 1, source=str(file))
-    return _Shape(score, separator, names, units, first, commas and separator != "," or (commas and not points))
+        raise input_error(
+            "trace-number", words, "export it with one of them", line=first + 1, source=str(file)
+        )
+    return _Shape(score, separator, names, units, first, commas and (separator != "," or not points))
 
 
-def _numeric(
-    frame: "pl.DataFrame", source: str, how: str, first_row: int, units: Mapping[str, str]
-) -> Table:
+def _numeric(frame: "pl.DataFrame", source: str, how: str, first_row: int, units: Mapping[str, str]) -> Table:
     """Return the columns that are numbers or stamps, the others by name."""
     import polars as pl
 
@@ -252,8 +252,6 @@ def _numeric(
 
 def _stamps(text: "pl.Series") -> "pl.Series | None":
     """Return stamps of date and time, or of a time of day on one day; None where the texts are neither."""
-    import polars as pl
-
     first = text.drop_nulls().head(1)
     if not len(first) or not _is_stamp(str(first[0])):
         return None

@@ -58,7 +58,7 @@ class PathLink(Link):
         )
 
     def motion(self, pair: Pair) -> Trace | None:
-        """Return the commanded joints, or without any the actual ones in their place: how far a run has come."""
+        """Return the commanded joints, without any the actual ones: how far a run has come."""
         table = pair.run.controller
         if table is None or not pair.has_actual_joints_alone:
             return self.trace(pair)
@@ -127,7 +127,7 @@ class _DriveLink(Link):
 
 
 class ServoLink(_DriveLink):
-    """What the drives do of what was commanded: q_act - q_cmd, of a log of q_act alone of what was planned."""
+    """What the drives do of what was commanded, q_act - q_cmd; without q_cmd, of what was planned."""
 
     name = "servo"
     signal = "joint_actual"
@@ -142,7 +142,9 @@ class ServoLink(_DriveLink):
         sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
         if pair.has_actual_joints_alone:
             actual_rad = table.q_act_rad - logged_correction(pair, table)
-            return joint_trace(self, pair, table, actual_rad, "q_act_rad", None, base=base, sigma_rad=sigma_rad)
+            return joint_trace(
+                self, pair, table, actual_rad, "q_act_rad", None, base=base, sigma_rad=sigma_rad
+            )
         if table.q_cmd_rad is None:
             return None
         pair = pair.with_measured_joints("q_cmd")
