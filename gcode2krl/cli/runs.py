@@ -5,7 +5,9 @@ import click
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
 
-_WHAT = {"import": "Make a run of a log of another program: guess its columns, show them, keep the answer."}
+_WHAT = {
+    "import": "Make a run of a log: CSV of any separator, Parquet, MATLAB v5, RSI telegrams, a KRC trace."
+}
 
 
 @click.command(

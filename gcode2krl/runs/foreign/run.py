@@ -87,7 +87,7 @@ def run_from(
     Examples
     --------
     >>> from gcode2krl import run_from
-    >>> run_from("my.csv", units={"angle": "deg"}).controller.q_act_rad.shape[1]
+    >>> run_from("run-1/controller.csv", units={"angle": "deg"}).controller.q_act_rad.shape[1]
     6
     """
     native = _native(source) if isinstance(source, (str, Path)) else None
