@@ -25,6 +25,7 @@ _HOMES = {
     "diagnose": "gcode2krl.gap",
     "deflect": "gcode2krl.compliance",
     "load_run": "gcode2krl.runs",
+    "run_from": "gcode2krl.runs.foreign",
     "Run": "gcode2krl.runs",
     "Gcode2KrlError": "gcode2krl.errors",
     "Issue": "gcode2krl.errors",
@@ -45,6 +46,7 @@ __all__ = [
     "predict",
     "predict_many",
     "read_gcode",
+    "run_from",
     "set_targets",
     "solve_joints",
     "verify_krl",
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
     from gcode2krl.pipeline import plan_motion, predict, set_targets, solve_joints
     from gcode2krl.prediction import Prediction
     from gcode2krl.runs import Run, load_run
+    from gcode2krl.runs.foreign import run_from
 
 
 def __getattr__(name: str) -> Any:

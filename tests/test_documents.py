@@ -78,12 +78,13 @@ def folder(tmp_path, monkeypatch):
 
 
 def measured(folder):
-    """Write a prediction and three runs with play in axis 2 to a folder."""
-    from tests.gap.synthetic import applied, prediction, runs, write
+    """Write a prediction and three runs with play in axis 2 to a folder, and the joints of one as a log."""
+    from tests.gap.synthetic import applied, prediction, runs, write, write_log
 
     prediction().save(folder / "prediction")
     for run in runs(applied("backlash:target=A2,gap_deg=0.02"), 3, 5):
         write(run, folder)
+        write_log(run, folder / "my.csv")
 
 
 def traced(folder, run):

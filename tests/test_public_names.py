@@ -29,6 +29,7 @@ PUBLIC = {
         "predict",
         "predict_many",
         "read_gcode",
+        "run_from",
         "set_targets",
         "solve_joints",
         "verify_krl",

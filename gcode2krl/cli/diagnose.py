@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         "gcode2krl diagnose prediction/ run-1/ run-2/",
         "gcode2krl diagnose prediction/ run-1/ run-2/ --holdout run-3/ --html gap.html",
         "gcode2krl diagnose --from-log run-1/",
+        "gcode2krl diagnose prediction/ my.csv",
     ),
 )
 @click.argument("folders", nargs=-1, required=True, metavar="[PREDICTION] RUN…")
@@ -55,6 +56,7 @@ def command(
 ) -> int:
     """Say where measured runs differ from their prediction, which effects explain it, and how far it shrinks.
 
+    A run is a folder, or a log of another program if its columns are certain: see `gcode2krl runs import`.
     Without --holdout each run is held out in turn; with it, the runs it names only test. Exit code 0 whenever
     a diagnosis was made, whatever it found.
     """
@@ -129,7 +131,7 @@ def _diagnosis(
     """Return the diagnosis of the runs in some folders; without ``from_log`` the first is a prediction."""
     from gcode2krl.gap import diagnose, diagnose_log
     from gcode2krl.prediction import Prediction
-    from gcode2krl.runs import load_run
+    from gcode2krl.runs.foreign import run_or_log
 
     if not from_log and len(folders) < 2:
         remedy = "name a prediction and its runs, or use --from-log"
@@ -137,14 +139,14 @@ def _diagnosis(
     names = folders if from_log else folders[1:]
     with console.stages() as begin:
         reading = begin("reading runs")
+        prediction = None if from_log else Prediction.load(folders[0])
         read = []
         for name in (*names, *holdout):
-            read.append(load_run(name, partial=from_log))
+            read.append(run_or_log(name, prediction, partial=from_log))
             reading(len(read), len(names) + len(holdout))
         runs, held = read[: len(names)], read[len(names) :]
-        if from_log:
+        if prediction is None:
             return diagnose_log(runs, _cell(cell_path), held, effects=effects, begin=begin)
-        prediction = Prediction.load(folders[0])
         console.heading.has_cell(prediction.cell, None)
         return diagnose(prediction, runs, held, effects=effects, begin=begin)
 

@@ -30,6 +30,7 @@ _COMMANDS = {
     "report": "Show a prediction as one page for a browser: 3D path, robot, plots and G-code, linked.",
     "diagnose": "Say where measured runs differ from their prediction, which effects explain it, "
     "and how far it shrinks.",
+    "runs": "Measured runs: make one of a log.",
     "identify": "Fit the cell to measurements: controller, stiffness, sensor, cutting force.",
     "online": "Compensate online: the twin, the RSI server, replay.",
     "stiffness-map": "Draw how far the robot bends under a load: over $BASE's plane, over the spin, "

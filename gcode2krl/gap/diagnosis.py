@@ -4,18 +4,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.errors import input_error
+from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import PART, PATH, SIGNALS, TIMING, Link
+from gcode2krl.gap.beside.links import PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
+from gcode2krl.gap.beside.retiming import on_own_timing
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface
@@ -106,7 +109,10 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     context, slips, issues = set_up.context, set_up.slips, set_up.issues
     if set_up.is_final:
         return answer(context, slips, issues)
-    context = _with_data(with_controller_clocks(context, PATH))
+    context = with_controller_clocks(context, PATH)
+    on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
+    issues = [*issues, *_of_actual_joints(context, on_time)]
+    context = _with_data(on_time)
     rough = _rough(context)
     links = begin("links")
     for count, link in enumerate(SIGNALS):
@@ -122,6 +128,29 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     if surface is not None:
         context = context.with_judgement(surface)
     return answer(context, slips, issues)
+
+
+def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
+    """Return what logs without commanded joints cost, and which of them leave the planned times."""
+    pairs = [(a, b) for a, b in zip(planned.pairs, on_time.pairs, strict=True) if a.has_actual_joints_alone]
+    alone = [pair.name for pair, _ in pairs]
+    if not alone:
+        return []
+    late = []
+    for pair, timed in pairs:
+        moved_s = timed.inputs.time_s - pair.inputs.time_s
+        if (largest_s := float(np.ptp(moved_s))) > 0.0:
+            words = (
+                f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
+            )
+            late.append(
+                Issue("warning", "joints-actual-alone", 0, words, "record the commanded joints for a cause")
+            )
+    words = (
+        f"{', '.join(alone)}: no commanded joints: the actual ones are compared with the prediction's, path "
+        "and drives as one link (servo); a lag that all axes share is taken for the clock"
+    )
+    return [Issue("note", "joints-actual-alone", 0, words), *late]
 
 
 def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:

@@ -95,15 +95,17 @@ def check_program(run: Run, program_sha256: str) -> list[Issue]:
 
 
 def _signals(run: Run, position_mm: Floats, q_rad: Floats | None) -> Iterator[_Signal]:
-    xyz_cmd, q_cmd = (_columns(name) for name in ("position_cmd_mm", "q_cmd_rad"))
+    xyz_cmd, q_cmd, q_act = (_columns(name) for name in ("position_cmd_mm", "q_cmd_rad", "q_act_rad"))
     if run.controller is not None and run.controller.position_cmd_mm is not None:
         yield _Signal(run.controller, xyz_cmd, run.controller.position_cmd_mm, position_mm, _LENGTH)
-    if run.controller is not None and run.controller.q_cmd_rad is not None and q_rad is not None:
-        both = np.vstack([run.controller.q_cmd_rad, q_rad])
+    path_rad = None if run.controller is None else run.controller.path_rad
+    if run.controller is not None and path_rad is not None and q_rad is not None:
+        both = np.vstack([path_rad, q_rad])
         known: Bools = np.asarray(np.isfinite(both).all(axis=0))
         if known.any() and run.head.angles == "absolute":
-            columns = tuple(name for name, good in zip(q_cmd, known.tolist(), strict=True) if good)
-            measured, predicted = run.controller.q_cmd_rad[:, known], q_rad[:, known]
+            names = q_act if run.controller.q_cmd_rad is None else q_cmd
+            columns = tuple(name for name, good in zip(names, known.tolist(), strict=True) if good)
+            measured, predicted = path_rad[:, known], q_rad[:, known]
             yield _Signal(run.controller, columns, measured * DEG_PER_RAD, predicted * DEG_PER_RAD, _ANGLE)
     if run.tracker is not None and run.head.frames.tracker == "base":
         yield _Signal(run.tracker, XYZ, run.tracker.position_mm, position_mm, _LENGTH)

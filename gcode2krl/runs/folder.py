@@ -1,6 +1,6 @@
 """A measured run: a folder with ``run.toml`` and what was recorded."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar, get_args
@@ -118,32 +118,56 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
             return read_krc_trace(file, _gear_ratio(place, head))
         return read_rsi_log(file) if is_rsi_log(file) else _sheet(Controller)(file)
 
+    readers = {
+        "controller": controller_sheet,
+        "tracker": _sheet(Tracker),
+        "force": _sheet(Force),
+        "poses": read_poses,
+    }
+    sheets = {what: read(file) for what, read in readers.items() if (file := files[what]) is not None}
     traced = files["controller"] is not None and is_data_set(files["controller"])  # angles of the drives
-    controller = _table(Controller, files["controller"], controller_sheet, head, partial or traced)
-    tracker = _table(Tracker, files["tracker"], _sheet(Tracker), head, partial)
-    force = _table(Force, files["force"], _sheet(Force), head, partial)
-    poses = _table(Poses, files["poses"], read_poses, head, partial)
     scan = read_scan(files["scan"]) if files["scan"] else None
+    issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]))
+    name = place.resolve().name
+    return assembled(name, place, head, sheets, partial=partial, traced=traced, scan=scan, issues=issues)
+
+
+def assembled(
+    name: str,
+    place: Path,
+    head: RunHead,
+    sheets: Mapping[str, Sheet],
+    *,
+    partial: bool = False,
+    traced: bool = False,
+    scan: Scan | None = None,
+    issues: Iterable[Issue] = (),
+) -> Run:
+    """Return the run of sheets by the names of its tables, checked; errors as for `load_run`.
+
+    ``traced``: joints may be missing in the controller's table.
+    """
+    controller = _table(Controller, sheets.get("controller"), head, partial or traced)
+    tracker = _table(Tracker, sheets.get("tracker"), head, partial)
+    force = _table(Force, sheets.get("force"), head, partial)
+    poses = _table(Poses, sheets.get("poses"), head, partial)
     check_together(controller, tracker, force)
     check_columns(controller, tracker, head)
     tables = (controller, tracker, force, poses)
     table_issues = [issue for table in (*tables, scan) if table for issue in table.issues]
     table_issues += [issue for table in tables if table for issue in quantised(table, head)]
-    issues = (*issues, *_paths(place, head), *_not_read(place, files["controller"]), *table_issues)
-    return Run(place.resolve().name, place, head, controller, tracker, force, scan, issues, poses)
+    return Run(name, place, head, controller, tracker, force, scan, (*issues, *table_issues), poses)
 
 
 def _sheet(kind: type[Measured]) -> Callable[[Path], Sheet]:
     return lambda file: read_sheet(file, columns_of(kind))
 
 
-def _table(
-    kind: type[AnyMeasured], file: Path | None, read: Callable[[Path], Sheet], head: RunHead, partial: bool
-) -> AnyMeasured | None:
-    if file is None:
+def _table(kind: type[AnyMeasured], sheet: Sheet | None, head: RunHead, partial: bool) -> AnyMeasured | None:
+    if sheet is None:
         return None
     clock_s = getattr(head.clocks, f"{kind.__name__.lower()}_s", 0.0)
-    table = build(kind, read(file), partial=partial, clock_s=clock_s)
+    table = build(kind, sheet, partial=partial, clock_s=clock_s)
     check_table(table, head)
     return table
 

@@ -75,6 +75,17 @@ class Files(_Table):
     scan: str | None = None
 
 
+class Layout(_Table):
+    """How the columns of another exporter's table became those of the run; empty where they were its own."""
+
+    file: str | None = None
+    columns: dict[str, str] = Field(default_factory=dict)
+    """Their name → column of the run without its unit."""
+    units: dict[str, str] = Field(default_factory=dict)
+    order: str | None = None
+    """Of the three angles of an orientation."""
+
+
 class RunHead(_Table):
     """``run.toml`` as read."""
 
@@ -91,6 +102,7 @@ class RunHead(_Table):
     channels: Channels = Channels()
     clocks: Clocks = Clocks()
     files: Files = Files()
+    layout: Layout = Layout()
     notes: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("started")

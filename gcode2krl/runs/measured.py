@@ -117,6 +117,11 @@ class Controller(Measured):
     """(n, 1)"""
 
     @property
+    def path_rad(self) -> Floats | None:
+        """Return the joints (n, 6) that show how far a run has come: the commanded, else the actual ones."""
+        return self.q_act_rad if self.q_cmd_rad is None else self.q_cmd_rad
+
+    @property
     def joints_measured(self) -> tuple[int, ...]:
         """Return the joints 1 to 6 that have both a commanded and an actual angle."""
         return _present(self.q_cmd_rad, self.q_act_rad)

@@ -41,6 +41,12 @@ def is_rsi_log(file: Path) -> bool:
     return _START.search(head) is not None or (b"ipoc" in line.lower() and len(named) > 1)
 
 
+def is_telegrams(file: Path) -> bool:
+    """Tell whether a file holds RSI telegrams as they were sent."""
+    with file.open("rb") as stream:
+        return _START.search(stream.read(65536)) is not None
+
+
 def read_rsi_log(path: str | Path) -> Sheet:
     """Read a log; telegrams that cannot be read are dropped and counted.
 
@@ -50,9 +56,7 @@ def read_rsi_log(path: str | Path) -> Sheet:
     try:
         if file.stat().st_size > _LARGEST_LOG:
             raise _wrong(file, "larger than 1 GB", "cut the log to the run")
-        with file.open("rb") as stream:
-            telegrams = _START.search(stream.read(65536)) is not None
-        return _from_telegrams(file) if telegrams else _from_csv(file)
+        return _from_telegrams(file) if is_telegrams(file) else _from_csv(file)
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
 

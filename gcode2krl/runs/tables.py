@@ -54,10 +54,10 @@ def read_sheet(path: str | Path, wanted: Iterable[str]) -> Sheet:
     file = Path(path)
     frame, first_row = _read_frame(file)
     names = tuple(printable(name.strip()) for name in frame.columns)
-    _refuse_twins(names, file)
+    refuse_twins(names, file)
     frame.columns = list(names)
     needed = set(wanted)
-    columns = {name: _numbers(frame[name], name, first_row, file) for name in names if name in needed}
+    columns = {name: numbers(frame[name], name, first_row, file) for name in names if name in needed}
     return Sheet(columns, names, first_row, str(file))
 
 
@@ -142,14 +142,15 @@ def _no_table(file: Path, why: str) -> NotUnderstoodError:
     )
 
 
-def _refuse_twins(names: tuple[str, ...], file: Path) -> None:
+def refuse_twins(names: tuple[str, ...], file: Path) -> None:
+    """Raise `NotUnderstoodError` for a column that is there twice."""
     for name in names:
         stem = name.partition("_duplicated_")[0]
         if names.count(name) > 1 or (stem != name and stem in names):
             raise input_error("trace-column", f"column {stem}: is present twice", line=1, source=str(file))
 
 
-def _numbers(column: "pl.Series", name: str, first_row: int, file: Path) -> Floats:
+def numbers(column: "pl.Series", name: str, first_row: int, file: Path) -> Floats:
     """Return a column (n,) as numbers, NaN where empty; anything else is an error with its row."""
     import polars as pl
 

@@ -53,7 +53,7 @@ def test_a_list_of_commands_is_what_click_makes_of_the_commands(group, width):
 
 
 def test_there_are_groups_on_use():
-    assert {group.name for group in ON_USE} == {"commands", "identify"}
+    assert {group.name for group in ON_USE} == {"commands", "identify", "runs"}
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def ready(folder, run):  # noqa: F811
             assert run("predict", "part.nc", "--cell", "cell.toml", "-o", "prediction").code == 0
         if "identify force" in line:
             force_run(folder)
-        elif "run-1" in line:
+        elif "run-1" in line or "my.csv" in line:
             measured(folder)
         if "trace.csv" in line:
             traced(folder, run)

@@ -209,6 +209,18 @@ def _run(
     return Run(f"run-{number + 1}", Path(f"run-{number + 1}"), RunHead(), **made)
 
 
+def write_log(run: Run, file: Path) -> Path:
+    """Write the actual joints of a run as people have them: Time, Axis1 … Axis6."""
+    import polars as pl
+
+    assert run.controller is not None
+    assert run.controller.q_act_rad is not None
+    deg = run.controller.q_act_rad * DEG_PER_RAD
+    columns = {"Time": run.controller.time_s} | {f"Axis{n + 1}": deg[:, n] for n in range(6)}
+    pl.DataFrame(columns).write_csv(file)
+    return file
+
+
 def write(run: Run, folder: Path, head: str = "") -> Path:
     """Write a run as the folder that a user would have."""
     import polars as pl

@@ -94,10 +94,11 @@ def coarse_offset(pair: Pair, table: Measured) -> float:
     """Return the offset of a table of up to 10 s by how its motion follows the prediction; 0 where small."""
     inputs = pair.inputs
     if isinstance(table, Controller):
-        if table.q_cmd_rad is None:
+        path_rad = table.path_rad
+        if path_rad is None:
             return 0.0
-        known = np.isfinite(table.q_cmd_rad).all(axis=0)
-        measured, predicted = table.q_cmd_rad[:, known], inputs.q_cmd_rad[:, known]
+        known = np.isfinite(path_rad).all(axis=0)
+        measured, predicted = path_rad[:, known], inputs.q_cmd_rad[:, known]
     else:
         position: Floats | None = getattr(table, "position_mm", None)
         if position is None:

@@ -40,6 +40,14 @@ class Pair:
         """Return the run's name."""
         return self.run.name
 
+    @property
+    def has_actual_joints_alone(self) -> bool:
+        """Tell whether the log has actual joints and no commanded ones: the plan's stand in for them."""
+        table = self.run.controller
+        if table is None or table.q_act_rad is None or table.q_cmd_rad is not None:
+            return False
+        return not self.from_log and self.run.head.angles == "absolute"
+
     def stamps(self, table: Measured) -> Floats:
         """Return the time stamps of a table less its coarse clock error."""
         stamps: Floats = table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)

@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.beside.pair import Pair
 from gcode2krl.gap.beside.timing import late_s
+from gcode2krl.gap.beside.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -26,10 +27,11 @@ def retimed(pair: Pair) -> Pair:
     lengths differ by more than 2 % are not the same path: the pair is returned unchanged.
     """
     table = pair.run.controller
-    if table is None or table.q_cmd_rad is None or not np.isfinite(table.q_cmd_rad).all():
+    path_rad = None if table is None else table.path_rad
+    if table is None or path_rad is None or not np.isfinite(path_rad).all():
         return pair
     inputs, own_s = pair.inputs, pair.stamps(table)
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(table.q_cmd_rad, axis=0), axis=1))])
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_rad, axis=0), axis=1))])
     wanted = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(inputs.q_cmd_rad, axis=0), axis=1))])
     if (
         travelled[-1] <= 0.0
@@ -71,6 +73,43 @@ def refined(pair: Pair, path: "Link") -> Pair:
         now = pair.inputs.time_s
         pair = _at_times(pair, now + np.interp(now, trace.time_s[moves], smooth))
     return pair
+
+
+def on_own_timing(pair: Pair, servo: "Link") -> Pair:
+    """Return a pair of actual joints alone on the run's own timing; others as they are.
+
+    A constant offset is the clock's: the median of those of the joints, so that the lag of one axis stays.
+    Only lateness beyond what drives have is taken for timing.
+    """
+    if not pair.has_actual_joints_alone:
+        return pair
+    for again in (False, True):
+        traces = servo.traces([pair])
+        if not traces:
+            return pair
+        pair = pair.later(servo.table, _median_offset_s(traces[0]))
+        traces = servo.traces([pair])
+        late, moves = late_s(traces[0], traces[0].residual)
+        largest_s = float(np.quantile(np.abs(late[moves]), 0.95)) if moves.any() else 0.0
+        if again or largest_s < LIMITS.clock_large_s:
+            return pair
+        pair = refined(retimed(pair) if largest_s > LIMITS.retime_far_s else pair, servo)
+    return pair
+
+
+def _median_offset_s(trace: Trace) -> float:
+    """Return by how much the joints are late, as the median of what each of them shows alone."""
+    offset_s = 0.0
+    for _ in range(LIMITS.clock_steps):
+        on_time = replace(trace, time_s=trace.time_s - offset_s)
+        rate = on_time.rate - on_time.rate.mean(axis=0)
+        power = np.sum(rate**2, axis=0)
+        moves = power > LIMITS.timing_slow**2 * float(power.max(initial=0.0))
+        if not moves.any():
+            return offset_s
+        residual = on_time.residual - on_time.residual.mean(axis=0)
+        offset_s -= float(np.median(np.sum(rate * residual, axis=0)[moves] / power[moves]))
+    return offset_s
 
 
 def _at_times(pair: Pair, time_s: Floats) -> Pair:

@@ -45,12 +45,8 @@ class OverrideTest:
 def _percent(pair: Pair) -> float | None:
     """Return 100 times predicted over measured time in motion; None where paths differ in length."""
     controller, tracker = pair.run.controller, pair.run.tracker
-    if (
-        controller is not None
-        and controller.q_cmd_rad is not None
-        and np.isfinite(controller.q_cmd_rad).all()
-    ):
-        measured = _in_motion(controller.time_s, controller.q_cmd_rad, _LIMITS.still_rad_s)
+    if controller is not None and controller.path_rad is not None and np.isfinite(controller.path_rad).all():
+        measured = _in_motion(controller.time_s, controller.path_rad, _LIMITS.still_rad_s)
         predicted = _in_motion(pair.inputs.time_s, pair.inputs.q_cmd_rad, _LIMITS.still_rad_s)
     elif tracker is not None:
         measured = _in_motion(tracker.time_s, tracker.position_mm, _LIMITS.still_mm_s)

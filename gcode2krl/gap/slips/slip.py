@@ -46,8 +46,11 @@ class SlipTest(Protocol):
 
 
 def motion_traces(pairs: Sequence[Pair]) -> list[Trace]:
-    """Return what shows how far the runs have come: their commanded joints, or without any their tips."""
-    return PATH.traces(pairs) or MECHANICS.traces(pairs)
+    """Return what shows how far the runs have come: their joints, or without any their tips."""
+    joints = [trace for pair in pairs if (trace := PATH.motion(pair)) is not None]
+    return [
+        trace for trace in joints if len(trace.time_s) >= THRESHOLDS.beside.trace_least_rows
+    ] or MECHANICS.traces(pairs)
 
 
 def rms(vectors: Iterable[Floats]) -> float:

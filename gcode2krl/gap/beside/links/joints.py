@@ -18,7 +18,7 @@ from gcode2krl.gap.beside.instruments import (
     constants,
     play_start_columns,
 )
-from gcode2krl.gap.beside.interpolation import nearest_rows
+from gcode2krl.gap.beside.interpolation import cubic, nearest_rows
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.links.traces import joint_trace
 from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
@@ -56,6 +56,14 @@ class PathLink(Link):
         return joint_trace(
             self, pair, table, table.q_cmd_rad, "q_cmd_rad", None, base=base, sigma_rad=LIMITS.model_rad
         )
+
+    def motion(self, pair: Pair) -> Trace | None:
+        """Return the commanded joints, without any the actual ones: how far a run has come."""
+        table = pair.run.controller
+        if table is None or not pair.has_actual_joints_alone:
+            return self.trace(pair)
+        run = replace(pair.run, controller=replace(table, q_cmd_rad=table.q_act_rad))
+        return self.trace(replace(pair, run=run))
 
     def simulated(self, trace: Trace, applied: Sequence[Applied]) -> Signals:
         """Return the commanded path, planned once for all runs of a prediction."""
@@ -119,21 +127,28 @@ class _DriveLink(Link):
 
 
 class ServoLink(_DriveLink):
-    """What the drives do of what was commanded: q_act - q_cmd."""
+    """What the drives do of what was commanded, q_act - q_cmd; without q_cmd, of what was planned."""
 
     name = "servo"
     signal = "joint_actual"
-    needs = "controller.csv with q1_cmd_deg … and q1_act_deg …"
+    needs = "controller.csv with q1_act_deg …, and q1_cmd_deg … or a prediction"
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
-        """Return q_act - q_cmd less a logged correction."""
+        """Return q_act - q_cmd less a logged correction; q_act itself where it is compared with the plan."""
         table = pair.run.controller
-        if table is None or table.q_act_rad is None or table.q_cmd_rad is None:
+        if table is None or table.q_act_rad is None:
+            return None
+        stated_deg = pair.run.head.noise.q_act_deg
+        sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
+        if pair.has_actual_joints_alone:
+            actual_rad = table.q_act_rad - logged_correction(pair, table)
+            return joint_trace(
+                self, pair, table, actual_rad, "q_act_rad", None, base=base, sigma_rad=sigma_rad
+            )
+        if table.q_cmd_rad is None:
             return None
         pair = pair.with_measured_joints("q_cmd")
         difference = table.q_act_rad - table.q_cmd_rad - logged_correction(pair, table)
-        stated_deg = pair.run.head.noise.q_act_deg
-        sigma_rad = None if stated_deg is None else stated_deg * RAD_PER_DEG
         return joint_trace(
             self, pair, table, difference, "q_act_rad", "q_cmd_rad", base=base, sigma_rad=sigma_rad
         )
@@ -185,6 +200,9 @@ def _with_fitted(pair: Pair, judged: FittedVerdict) -> Pair:
     joints_rad[:, list(trace.columns)] = judged.fitted(
         trace, np.clip(stamps, trace.time_s[0], trace.time_s[-1])
     )
+    if pair.has_actual_joints_alone and trace.plus == "q_act_rad":
+        planned_rad = cubic(stamps, pair.inputs.time_s, pair.inputs.q_cmd_rad)
+        joints_rad[:, list(trace.columns)] -= planned_rad[:, list(trace.columns)]
     return replace(pair, fitted={**pair.fitted, trace.plus: joints_rad})
 
 
