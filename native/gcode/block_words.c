@@ -260,8 +260,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == D_PROGRAM_NUMBER) { /* behind blocks another program begins */
             b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < '@') {
-            take_dialect_mark(b, c);
-            used = used || b->shift || b->tip;
+            take_dialect_mark(b, c, AT(words->value, k));
+            used = used || b->shift || b->tip || b->corner || b->turn || b->modal || b->cycle;
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;
