@@ -215,6 +215,7 @@
 #define V_M71 71
 #define V_M72 72
 #define V_M73 73
+#define V_M97 97
 #define V_M98 98
 #define V_M99 99
 #define V_L_TOOL 1
@@ -678,6 +679,7 @@
 #define PF_FAULT_MACRO_POINT 27
 #define PF_FAULT_M98_MACRO 28
 #define PF_FAULT_M99_WORDS 29
+#define PF_FAULT_LOCAL 30
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0

@@ -300,3 +300,37 @@ def test_a_rotation_that_says_anything_else_is_refused(lines, dialect):
 def test_no_zero_is_in_force_behind_g500():
     assert way("G500\nSUPA G0 Z0\nG54\nG0 X1 Y2 Z3")[-1].tolist() == [1.0, 2.0, 3.0]
     assert [(i.code, i.line) for i in errors("G500\nX1\nX2")] == [("dialect-statement", 5)]
+
+
+@pytest.mark.parametrize(
+    ("lines", "places"),
+    [
+        ("M97 P100\nX9.\nM30\nN100 X1.\nY2.\nM99", [[1, 0, 5], [1, 2, 5], [9, 2, 5]]),
+        ("G91\nM97 P100 L3\nM30\nN100 X1.\nM99", [[1, 0, 5], [2, 0, 5], [3, 0, 5]]),
+        ("X4. M97 P12000\nM30\nN12000 Y2. M99", [[4, 0, 5], [4, 2, 5]]),
+        ("#1=7.\nM97 P10\nM30\nN10 X#1\nM97 P20\nM99\nN20 Y#1\n#1=8.\nM99", [[7, 0, 5], [7, 7, 5]]),
+        ("M98 P50\nM30\nO50\nM97 P10\nM99\nN10 X3.\nM99", [[3, 0, 5]]),
+    ],
+)
+def test_m97_calls_lines_of_its_own_program(lines, places):
+    np.testing.assert_allclose(way(lines, "fanuc"), places, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        *(
+            "M97 P100\nM30",
+            "M97\nM30\nN100 X1.\nM99",
+            "M97 P10\nM30\nN10 X1.\nM99\nN10 X2.\nM99",
+            "M97 P10 Q2\nM30\nN10 M99",
+        ),
+        *(
+            "M97 P1.5\nM30\nN1 M99",
+            "M97 P10\nM30\nN10 M97 P10\nM99",
+            "M97 P10\nM30\nWHILE [1 EQ 1] DO1\nN10 X1.\nM99\nEND1",
+        ),
+    ],
+)
+def test_an_m97_that_leads_nowhere_sure_is_refused(lines):
+    assert errors(lines, "fanuc")
