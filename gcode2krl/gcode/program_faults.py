@@ -252,7 +252,7 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
         "write M98 P1234 L3",
     ),
     FAULT_LOCAL: (
-        "M97 of a Haas calls the lines from N of its P on to M99: the number stands once in the file, in no loop",
+        "M97 of a Haas calls the lines from N of its P on to M99; N stands once in the file, in no loop",
         "write N and this number at the first of these lines, and nowhere else",
     ),
     FAULT_M99_WORDS: (
