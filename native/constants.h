@@ -335,10 +335,12 @@
 #define D_CODE_NO_OFFSET (-5)
 #define D_CODE_TURN (-6)
 #define D_CODE_TURN_OFF (-7)
-#define D_CODE_REFUSED (-8)
+#define D_CODE_OFFSET (-8)
+#define D_CODE_REFUSED (-9)
 
 /* gcode2krl.gcode.dialects */
 #define DR_REASON_POLAR 3
+#define DR_REASON_OFFSET 7
 #define DR_REASON_SETTING 13
 #define DR_REASON_JOG 12
 #define DR_REASON_TOOL_NAME 17
@@ -551,6 +553,9 @@
 #define S_NOTE_SMALL_ARC 9
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
+#define S_FIRST_G505 9
+#define S_FIRST_G54_1 104
+#define S_FURTHER_OFFSETS 300
 #define S_EVENT_TOOL 0
 #define S_EVENT_SPINDLE 1
 #define S_EVENT_COOLANT 2

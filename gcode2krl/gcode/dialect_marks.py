@@ -43,8 +43,9 @@ AS_WRITTEN, POINT_REQUIRED, THOUSANDTHS, CALCULATOR = range(4)
 """What a number without a decimal point is: units, an error, least increments, or units where it is sure."""
 MOST_CODES = 9999
 """Largest G number of a dialect, ten times: G999.9."""
-CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_NO_OFFSET, CODE_TURN, CODE_TURN_OFF, CODE_REFUSED = (
-    range(-1, -9, -1)
+CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_NO_OFFSET, CODE_TURN, CODE_TURN_OFF = range(
+    -1, -8, -1
 )
+CODE_OFFSET, CODE_REFUSED = -8, -9
 """Instead of a code of the core; exact stop of one block; call of a subprogram; no work offset is in force;
-the coordinates are rotated, and are no more; ``CODE_REFUSED - k`` for the reason k."""
+the coordinates are rotated, and are no more; a further work offset; ``CODE_REFUSED - k`` for the reason k."""

@@ -29,7 +29,7 @@ REASONS: Final = (
     ("fine boring and back boring move the tool sideways in the hole", "mill the hole, or bore with G85"),
     ("probing or a skip signal is not a motion this program can make", "probe on the controller"),
     ("threading needs a spindle geared to the motion", "mill the thread"),
-    ("the further work offsets are not in the cell", "use G54 to G57"),
+    ("G54.1 needs P, a whole number from 1 to 300", "write G54.1 P1"),
     ("a cycle of the control", "let the post write the cycle out in G0 and G1"),
     ("jumps, loops and subprograms of this control are not read", "let the post write the program out"),
     ("variables and calculations of this control are not read", "let the post write plain numbers"),
@@ -141,7 +141,7 @@ REASONS: Final = (
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
-REASON_POLAR = _POLAR
+REASON_POLAR, REASON_OFFSET = _POLAR, _OFFSETS
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
@@ -174,6 +174,8 @@ class Dialect:
     """G numbers that are others of the core: 710 is 21."""
     exact: tuple[float, ...] = ()
     """G numbers of an exact stop in their block alone."""
+    offsets: tuple[float, ...] = ()
+    """G numbers of work offsets beyond those of LinuxCNC: G505 to G599, G54.1 with P."""
     no_offset: tuple[float, ...] = ()
     """G numbers after which no work offset is in force."""
     turn: tuple[float, ...] = ()
@@ -220,6 +222,7 @@ class Dialect:
             (d.CODE_HARMLESS, self.harmless),
             (d.CODE_EXACT, self.exact),
             (d.CODE_CALL, self.calls),
+            (d.CODE_OFFSET, self.offsets),
             (d.CODE_NO_OFFSET, self.no_offset),
             (d.CODE_TURN, self.turn),
             (d.CODE_TURN_OFF, self.turn_off),
@@ -282,7 +285,6 @@ _FANUC_REFUSED = {
     _BORING: (76, 87),
     _PROBING: (31, 37),
     _THREAD: (33,),
-    _OFFSETS: (54.1,),
     _MODAL_CALL: (66, 66.1),
     _SPLINE: (6.2, 5.2),
     _RETURN: (29,),
@@ -296,6 +298,7 @@ _FANUC: dict[str, Any] = {
     "programs": d.PROGRAMS_FANUC,
     "syntax": d.SKIP_LEVEL | d.HEAD_LINES | d.MACROS,
     "calls": (65,),
+    "offsets": (54.1,),
     "turn": (68,),
     "turn_off": (69,),
     "same": {63: 64, 62: 64},
@@ -386,9 +389,9 @@ _LIST: Final = (
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
         no_offset=(500,),
+        offsets=tuple(range(505, 600)),
         harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
         refused={
-            _OFFSETS: tuple(range(505, 600)),
             _THREAD: (33, 34, 35, 331, 332, 63),
             _POLAR: (110, 111, 112),
             _SMOOTH: (140, 141, 142, 143, 147, 148, 247, 248, 340, 341, 347, 348),

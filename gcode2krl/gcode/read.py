@@ -270,8 +270,8 @@ def _size_of(stream: BinaryIO) -> int:
 
 
 def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
-    """Return G54 to G59.3 (9, 4), X, Y, Z in mm and the rotation about Z in degrees; and which are stated."""
-    offsets, known = np.zeros((9, 4)), np.zeros(9, dtype=np.bool_)
+    """Return the work offsets (n, 4), X, Y, Z in mm, rotation about Z in degrees; and which are stated."""
+    offsets, known = np.zeros((len(WORK_OFFSETS), 4)), np.zeros(len(WORK_OFFSETS), dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
         if frame.b_deg or frame.c_deg:
             raise input_error(

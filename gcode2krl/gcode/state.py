@@ -42,7 +42,7 @@ STATE = np.dtype(
         ("offset_tool", "i4"),  # whose length it is, -1 = G49
         ("exact_stop", "i1"),
         ("tolerance", "f8"),  # NaN = none
-        ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
+        ("work_offset", "i4"),  # its place in WORK_OFFSETS
         ("base_mm", "f8", 3),  # zero of the programmed numbers: work offset plus shift, before its rotation
         ("shift_mm", "f8", 3),  # by G52 and G92, in force
         ("shift_kept_mm", "f8", 3),  # what G92.3 restores
@@ -293,7 +293,13 @@ _DOUBTS_OF_LETTER = {
 }
 DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in v.ALPHABET], dtype=np.int32)
 """What is in doubt after a word whose value cannot be read, by its letter, (28,)."""
-WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+FIRST_G505, FIRST_G54_1, FURTHER_OFFSETS = 9, 104, 300
+"""Places of a Sinumerik's G505 and a Fanuc's G54.1 P1 among the work offsets, and how many P there are."""
+WORK_OFFSETS = (
+    *("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"),
+    *(f"G{number}" for number in range(505, 600)),
+    *(f"G54.1P{number}" for number in range(1, FURTHER_OFFSETS + 1)),
+)
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5
 """M number of a spindle stop that a tool change brings about."""

@@ -36,6 +36,7 @@ typedef struct {
     bool exact_once;                          /* an exact stop of this block alone */
     uint8_t corner;                           /* CORNER_… to the next block, 0 = none */
     double corner_value;
+    int32_t offset_code, offset;              /* G505 to G599 or G54.1, ten times, 0 = none; its place */
     uint8_t turn;                             /* TURN_… of this block, 0 = none */
     bool turn_stated;
     double turned_deg;                        /* RPL= */

@@ -138,6 +138,12 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
         b->turn = code == D_CODE_TURN ? D_TURN_SET : D_TURN_OFF;
     } else if (code == D_CODE_TURN_OFF) {
         note(b, S_NOTE_CODE, (int32_t)written);
+    } else if (code == D_CODE_OFFSET) {
+        *good = b->g[V_WORK_OFFSET] < 0;
+        if (!*good)
+            report(b, F_SAME_GROUP_G, (Says){.a = b->g[V_WORK_OFFSET], .b = (double)written});
+        b->g[V_WORK_OFFSET] = V_G59;
+        b->offset_code = (int32_t)written;
     } else if (code == D_CODE_NO_OFFSET) {
         b->state->zero_in_doubt = S_ZERO_OFF;
     } else if (code == D_CODE_EXACT) {
@@ -231,6 +237,21 @@ static bool read_g10(Block *b) {
     const bool offset = b->has[V_WORD_L] && b->word[V_WORD_L] == V_L_OFFSET && b->has[V_WORD_P] && is_whole(p) && p >= 1.0 && p <= 6.0;
     b->pointless &= ~counts;
     return (offset && absolute && !b->has[V_WORD_R]) || refuse(b, DR_REASON_G10, V_G10);
+}
+
+/* G505 to G599, and G54.1 with P, are work offsets of the cell as G54 is. */
+static bool read_offset(Block *b) {
+    enum { G505 = 5050 };
+    const double p = b->word[V_WORD_P];
+    b->offset = S_FIRST_G505 + (b->offset_code - G505) / V_TENFOLD;
+    if (b->offset_code >= G505)
+        return true;
+    if (!b->has[V_WORD_P] || !is_whole(p) || p < 1.0 || p > S_FURTHER_OFFSETS)
+        return refuse(b, DR_REASON_OFFSET, b->offset_code);
+    b->offset = S_FIRST_G54_1 + (int32_t)p - 1;
+    b->has[V_WORD_P] = false;
+    b->pointless &= ~(1 << V_WORD_P);
+    return true;
 }
 
 /* Dwells and repeats of a drilling cycle. */
@@ -385,7 +406,8 @@ static void leave_out_idle_words(Block *b) {
 /* Make the words of a block those of the core; return false, with a finding, where that cannot be. */
 bool to_core_words(Block *b) {
     leave_out_idle_words(b);
-    bool good = read_cycle(b);
+    bool good = !b->offset_code || read_offset(b);
+    good = read_cycle(b) && good;
     if (b->g[V_NON_MODAL] == V_G10 && b->machine->programs == D_PROGRAMS_FANUC)
         good = read_g10(b) && good;
     if (b->pointless)

@@ -34,9 +34,13 @@ static double *offset_of(const Machine *machine, int32_t system) {
 
 static double in_rad(double deg) { return deg * (PI / 180.0); }
 
-/* Tell whether the work offset of a code, G54 to G59, is rotated. */
-bool turns_itself(const Machine *machine, int32_t code) {
-    return code <= V_G59 && offset_of(machine, (code - V_G54) / V_TENFOLD)[OFFSET_ROTATION] != 0.0;
+/* Return the place of the work offset of a code, G54 to G59.3. */
+int32_t offset_of_code(int32_t code) { return code <= V_G59 ? (code - V_G54) / V_TENFOLD : code - V_G59 + 5; }
+
+/* Tell whether the work offset that a block selects is rotated. */
+bool turns_itself(const Block *b) {
+    const int32_t place = b->offset_code ? b->offset : offset_of_code(b->g[V_WORK_OFFSET]);
+    return offset_of(b->machine, place)[OFFSET_ROTATION] != 0.0;
 }
 
 /* Take over the offsets in force; the tip stands still. */

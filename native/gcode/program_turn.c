@@ -92,7 +92,7 @@ bool may_stay_turned(Block *b) {
     const bool fanuc = b->machine->programs == D_PROGRAMS_FANUC;
     const bool plane = b->g[V_PLANE] >= 0 && b->g[V_PLANE] != V_PLANE_XY * V_TENFOLD;
     const bool zero = fanuc ? b->g[V_WORK_OFFSET] >= 0 || (special >= 0 && special != V_G4) : b->shift == D_SHIFT_ADD;
-    const bool turned_zero = b->g[V_WORK_OFFSET] >= 0 && turns_itself(b->machine, b->g[V_WORK_OFFSET]);
+    const bool turned_zero = b->g[V_WORK_OFFSET] >= 0 && turns_itself(b);
     return !(plane || zero || turned_zero) || refuse(b, DR_REASON_TURNED);
 }
 

@@ -334,3 +334,18 @@ def test_m97_calls_lines_of_its_own_program(lines, places):
 )
 def test_an_m97_that_leads_nowhere_sure_is_refused(lines):
     assert errors(lines, "fanuc")
+
+
+def _zero(x_mm):
+    return {"x_mm": x_mm, **dict.fromkeys(("y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 0.0)}
+
+
+def test_further_work_offsets_stand_in_the_cell():
+    zeros = {"G505": _zero(10.0), "G599": _zero(99.0), "G54.1P3": _zero(30.0), "G54.1P300": _zero(300.0)}
+    cell = over_demonstration({"work_offsets": zeros})
+    assert way("G505 X1\nG599 X1\nG54 X1", cell=cell)[:, 0].tolist() == [11.0, 100.0, 1.0]
+    assert way("G54.1 P3 X1.\nG54.1 P300\nX2.", "fanuc", cell)[:, 0].tolist() == [31.0, 302.0]
+    found = read("G506 X1", cell=cell).issues
+    assert [i.message.split()[0] for i in found if i.code == "work-offset-unknown"] == ["G506"]
+    for line in ("G54.1 X1.", "G54.1 P0 X1.", "G54.1 P301 X1.", "G54.1 P1.5 X1.", "G54 G54.1 P1"):
+        assert errors(line, "fanuc")

@@ -177,7 +177,7 @@ def test_a_message_is_kept():
     [
         *('CYCLE800(1,"TC",0)', "ROT X45", "SCALE X2", "G110 X0", "MCALL CYCLE81(1,2,3)", "GOTOF ENDE"),
         *("IF R1>2 GOTOF A", "R1=", "X=R", "X=IC(R1", "X=5+", "X=IC(5", "X=SIN(3", 'T="MILL"', "D2"),
-        *("DEF REAL A", "A3=0 B3=0 C3=1", "G147 X1", "G500 X1", "G505", "NONSENSE", "S2=100", "CR", "G58 X1"),
+        *("DEF REAL A", "A3=0 B3=0 C3=1", "G147 X1", "G500 X1", "NONSENSE", "S2=100", "CR", "G58 X1"),
         *(
             "ATRANS",
             "G0 TRANS X10",
