@@ -215,6 +215,7 @@
 #define V_M71 71
 #define V_M72 72
 #define V_M73 73
+#define V_M97 97
 #define V_M98 98
 #define V_M99 99
 #define V_L_TOOL 1
@@ -293,6 +294,16 @@
 #define D_SKIPPED 38
 #define D_SHIFT_SET 61
 #define D_SHIFT_ADD 43
+#define D_CORNER_ROUND 49
+#define D_CORNER_SIDE 50
+#define D_CORNER_LENGTH 51
+#define D_CYCLE 52
+#define D_ARGUMENT 53
+#define D_MODAL 54
+#define D_TURN_SET 55
+#define D_TURN_ADD 56
+#define D_TURN_DEG 57
+#define D_TURN_OFF 39
 #define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
@@ -306,7 +317,12 @@
 #define D_JUMP 9
 #define D_TIP 10
 #define D_FEED_AXES 11
-#define D_KIND_STEP 16
+#define D_MARKED 12
+#define D_CYCLE_CALL 13
+#define D_MODAL_CALL 14
+#define D_TOOL_NAME 15
+#define D_TURN 16
+#define D_KIND_STEP 32
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
 #define D_THOUSANDTHS 2
@@ -316,10 +332,15 @@
 #define D_CODE_HARMLESS (-2)
 #define D_CODE_EXACT (-3)
 #define D_CODE_CALL (-4)
-#define D_CODE_REFUSED (-5)
+#define D_CODE_NO_OFFSET (-5)
+#define D_CODE_TURN (-6)
+#define D_CODE_TURN_OFF (-7)
+#define D_CODE_OFFSET (-8)
+#define D_CODE_REFUSED (-9)
 
 /* gcode2krl.gcode.dialects */
 #define DR_REASON_POLAR 3
+#define DR_REASON_OFFSET 7
 #define DR_REASON_SETTING 13
 #define DR_REASON_JOG 12
 #define DR_REASON_TOOL_NAME 17
@@ -336,6 +357,13 @@
 #define DR_REASON_CORNER 43
 #define DR_REASON_STORED 44
 #define DR_REASON_G10 45
+#define DR_REASON_CYCLE_BESIDE 47
+#define DR_REASON_HEIGHTS 48
+#define DR_REASON_NO_OFFSET 49
+#define DR_REASON_MODAL_ZERO 50
+#define DR_REASON_TURN 51
+#define DR_REASON_TURNED 52
+#define DR_REASON_FIRST_TURNED 53
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -495,6 +523,8 @@
 #define FM_RESTORE_LENGTH 267
 
 /* gcode2krl.gcode.state */
+#define S_ZERO_DROPPED 1
+#define S_ZERO_OFF 2
 #define S_CUTTER_ON 1
 #define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
@@ -523,6 +553,9 @@
 #define S_NOTE_SMALL_ARC 9
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
+#define S_FIRST_G505 9
+#define S_FIRST_G54_1 104
+#define S_FURTHER_OFFSETS 300
 #define S_EVENT_TOOL 0
 #define S_EVENT_SPINDLE 1
 #define S_EVENT_COOLANT 2
@@ -651,6 +684,7 @@
 #define PF_FAULT_MACRO_POINT 27
 #define PF_FAULT_M98_MACRO 28
 #define PF_FAULT_M99_WORDS 29
+#define PF_FAULT_LOCAL 30
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -849,6 +883,9 @@ typedef struct {
     double rotation_cos;
     double rotation_sin;
     int8_t rotated;
+    double turned_deg;
+    double turned_about_mm[2];
+    int8_t turned_anew;
     int8_t offsets_taken;
     double home_28[3];
     double home_30[3];
@@ -912,6 +949,13 @@ typedef struct {
     int64_t held_rows[2];
     int64_t cutter_rows_removed;
     int64_t held_events;
+    int32_t corner;
+    int32_t corner_line;
+    double corner_mm;
+    double corner_from_mm[3];
+    double corner_mm_s;
+    int64_t corner_rows;
+    int64_t corner_events;
     int32_t retract;
     int32_t retract_line;
     int32_t unset_parameter;
@@ -928,6 +972,8 @@ typedef struct {
     int32_t cycle_plane;
     double cycle_unit_mm;
     int8_t cycle_absolute;
+    int32_t modal_call;
+    double modal_mm[4];
 } State;
 typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
 typedef char State_y_stands_at_8[offsetof(State, y) == 8 ? 1 : -1];
@@ -964,86 +1010,98 @@ typedef char State_pivot_mm_stands_at_224[offsetof(State, pivot_mm) == 224 ? 1 :
 typedef char State_rotation_cos_stands_at_240[offsetof(State, rotation_cos) == 240 ? 1 : -1];
 typedef char State_rotation_sin_stands_at_248[offsetof(State, rotation_sin) == 248 ? 1 : -1];
 typedef char State_rotated_stands_at_256[offsetof(State, rotated) == 256 ? 1 : -1];
-typedef char State_offsets_taken_stands_at_257[offsetof(State, offsets_taken) == 257 ? 1 : -1];
-typedef char State_home_28_stands_at_264[offsetof(State, home_28) == 264 ? 1 : -1];
-typedef char State_home_30_stands_at_288[offsetof(State, home_30) == 288 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_312[offsetof(State, rotary_deg) == 312 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_336[offsetof(State, rotary_unknown) == 336 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_344[offsetof(State, home_28_deg) == 344 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_368[offsetof(State, home_30_deg) == 368 ? 1 : -1];
-typedef char State_tool_vector_stands_at_392[offsetof(State, tool_vector) == 392 ? 1 : -1];
-typedef char State_has_vector_stands_at_416[offsetof(State, has_vector) == 416 ? 1 : -1];
-typedef char State_traori_stands_at_417[offsetof(State, traori) == 417 ? 1 : -1];
-typedef char State_zero_in_doubt_stands_at_418[offsetof(State, zero_in_doubt) == 418 ? 1 : -1];
-typedef char State_length_code_stands_at_420[offsetof(State, length_code) == 420 ? 1 : -1];
-typedef char State_feed_word_stands_at_424[offsetof(State, feed_word) == 424 ? 1 : -1];
-typedef char State_arcs_stands_at_432[offsetof(State, arcs) == 432 ? 1 : -1];
-typedef char State_mist_stands_at_436[offsetof(State, mist) == 436 ? 1 : -1];
-typedef char State_flood_stands_at_437[offsetof(State, flood) == 437 ? 1 : -1];
-typedef char State_ended_stands_at_438[offsetof(State, ended) == 438 ? 1 : -1];
-typedef char State_end_line_stands_at_440[offsetof(State, end_line) == 440 ? 1 : -1];
-typedef char State_tape_marks_stands_at_444[offsetof(State, tape_marks) == 444 ? 1 : -1];
-typedef char State_unit_named_stands_at_448[offsetof(State, unit_named) == 448 ? 1 : -1];
-typedef char State_blocks_stands_at_456[offsetof(State, blocks) == 456 ? 1 : -1];
-typedef char State_level_stands_at_464[offsetof(State, level) == 464 ? 1 : -1];
-typedef char State_largest_mm_stands_at_472[offsetof(State, largest_mm) == 472 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_480[offsetof(State, unknown_feed_line) == 480 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_484[offsetof(State, unknown_reported) == 484 ? 1 : -1];
-typedef char State_doubt_stands_at_488[offsetof(State, doubt) == 488 ? 1 : -1];
-typedef char State_motion_line_stands_at_492[offsetof(State, motion_line) == 492 ? 1 : -1];
-typedef char State_distance_line_stands_at_496[offsetof(State, distance_line) == 496 ? 1 : -1];
-typedef char State_distance_unnamed_line_stands_at_500[offsetof(State, distance_unnamed_line) == 500 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_504[offsetof(State, feed_mode_line) == 504 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_508[offsetof(State, rotary_refused) == 508 ? 1 : -1];
-typedef char State_note_count_stands_at_512[offsetof(State, note_count) == 512 ? 1 : -1];
-typedef char State_note_line_stands_at_552[offsetof(State, note_line) == 552 ? 1 : -1];
-typedef char State_note_word_stands_at_592[offsetof(State, note_word) == 592 ? 1 : -1];
-typedef char State_moved_mm_stands_at_632[offsetof(State, moved_mm) == 632 ? 1 : -1];
-typedef char State_misfits_stands_at_704[offsetof(State, misfits) == 704 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_708[offsetof(State, misfits_other_centre) == 708 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_712[offsetof(State, misfits_reversed) == 712 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_716[offsetof(State, misfits_exchanged) == 716 ? 1 : -1];
-typedef char State_spirals_stands_at_720[offsetof(State, spirals) == 720 ? 1 : -1];
-typedef char State_spiral_line_stands_at_724[offsetof(State, spiral_line) == 724 ? 1 : -1];
-typedef char State_spiral_start_stands_at_728[offsetof(State, spiral_start) == 728 ? 1 : -1];
-typedef char State_spiral_end_stands_at_736[offsetof(State, spiral_end) == 736 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_744[offsetof(State, spiral_unit_mm) == 744 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_752[offsetof(State, cutter_mode) == 752 ? 1 : -1];
-typedef char State_cutter_side_stands_at_756[offsetof(State, cutter_side) == 756 ? 1 : -1];
-typedef char State_cutter_code_stands_at_760[offsetof(State, cutter_code) == 760 ? 1 : -1];
-typedef char State_cutter_line_stands_at_764[offsetof(State, cutter_line) == 764 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_768[offsetof(State, cutter_radius_mm) == 768 ? 1 : -1];
-typedef char State_cutter_other_mm_stands_at_776[offsetof(State, cutter_other_mm) == 776 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_792[offsetof(State, cutter_entered) == 792 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_793[offsetof(State, cutter_failed) == 793 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_800[offsetof(State, cutter_normal) == 800 ? 1 : -1];
-typedef char State_held_turn_stands_at_816[offsetof(State, held_turn) == 816 ? 1 : -1];
-typedef char State_held_line_stands_at_820[offsetof(State, held_line) == 820 ? 1 : -1];
-typedef char State_held_from_stands_at_824[offsetof(State, held_from) == 824 ? 1 : -1];
-typedef char State_held_along_stands_at_840[offsetof(State, held_along) == 840 ? 1 : -1];
-typedef char State_held_centre_stands_at_856[offsetof(State, held_centre) == 856 ? 1 : -1];
-typedef char State_held_w_stands_at_872[offsetof(State, held_w) == 872 ? 1 : -1];
-typedef char State_held_sweep_stands_at_888[offsetof(State, held_sweep) == 888 ? 1 : -1];
-typedef char State_held_rows_stands_at_896[offsetof(State, held_rows) == 896 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_912[offsetof(State, cutter_rows_removed) == 912 ? 1 : -1];
-typedef char State_held_events_stands_at_920[offsetof(State, held_events) == 920 ? 1 : -1];
-typedef char State_retract_stands_at_928[offsetof(State, retract) == 928 ? 1 : -1];
-typedef char State_retract_line_stands_at_932[offsetof(State, retract_line) == 932 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_936[offsetof(State, unset_parameter) == 936 ? 1 : -1];
-typedef char State_unset_line_stands_at_940[offsetof(State, unset_line) == 940 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_944[offsetof(State, retract_unnamed_line) == 944 ? 1 : -1];
-typedef char State_in_cycles_stands_at_948[offsetof(State, in_cycles) == 948 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_952[offsetof(State, cycle_level_mm) == 952 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_960[offsetof(State, cycle_level_known) == 960 ? 1 : -1];
-typedef char State_cycle_r_stands_at_968[offsetof(State, cycle_r) == 968 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_976[offsetof(State, cycle_depth) == 976 ? 1 : -1];
-typedef char State_cycle_q_stands_at_984[offsetof(State, cycle_q) == 984 ? 1 : -1];
-typedef char State_cycle_p_stands_at_992[offsetof(State, cycle_p) == 992 ? 1 : -1];
-typedef char State_cycle_line_stands_at_1000[offsetof(State, cycle_line) == 1000 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_1004[offsetof(State, cycle_plane) == 1004 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_1008[offsetof(State, cycle_unit_mm) == 1008 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_1016[offsetof(State, cycle_absolute) == 1016 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 1024 ? 1 : -1];
+typedef char State_turned_deg_stands_at_264[offsetof(State, turned_deg) == 264 ? 1 : -1];
+typedef char State_turned_about_mm_stands_at_272[offsetof(State, turned_about_mm) == 272 ? 1 : -1];
+typedef char State_turned_anew_stands_at_288[offsetof(State, turned_anew) == 288 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_289[offsetof(State, offsets_taken) == 289 ? 1 : -1];
+typedef char State_home_28_stands_at_296[offsetof(State, home_28) == 296 ? 1 : -1];
+typedef char State_home_30_stands_at_320[offsetof(State, home_30) == 320 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_344[offsetof(State, rotary_deg) == 344 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_368[offsetof(State, rotary_unknown) == 368 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_376[offsetof(State, home_28_deg) == 376 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_400[offsetof(State, home_30_deg) == 400 ? 1 : -1];
+typedef char State_tool_vector_stands_at_424[offsetof(State, tool_vector) == 424 ? 1 : -1];
+typedef char State_has_vector_stands_at_448[offsetof(State, has_vector) == 448 ? 1 : -1];
+typedef char State_traori_stands_at_449[offsetof(State, traori) == 449 ? 1 : -1];
+typedef char State_zero_in_doubt_stands_at_450[offsetof(State, zero_in_doubt) == 450 ? 1 : -1];
+typedef char State_length_code_stands_at_452[offsetof(State, length_code) == 452 ? 1 : -1];
+typedef char State_feed_word_stands_at_456[offsetof(State, feed_word) == 456 ? 1 : -1];
+typedef char State_arcs_stands_at_464[offsetof(State, arcs) == 464 ? 1 : -1];
+typedef char State_mist_stands_at_468[offsetof(State, mist) == 468 ? 1 : -1];
+typedef char State_flood_stands_at_469[offsetof(State, flood) == 469 ? 1 : -1];
+typedef char State_ended_stands_at_470[offsetof(State, ended) == 470 ? 1 : -1];
+typedef char State_end_line_stands_at_472[offsetof(State, end_line) == 472 ? 1 : -1];
+typedef char State_tape_marks_stands_at_476[offsetof(State, tape_marks) == 476 ? 1 : -1];
+typedef char State_unit_named_stands_at_480[offsetof(State, unit_named) == 480 ? 1 : -1];
+typedef char State_blocks_stands_at_488[offsetof(State, blocks) == 488 ? 1 : -1];
+typedef char State_level_stands_at_496[offsetof(State, level) == 496 ? 1 : -1];
+typedef char State_largest_mm_stands_at_504[offsetof(State, largest_mm) == 504 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_512[offsetof(State, unknown_feed_line) == 512 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_516[offsetof(State, unknown_reported) == 516 ? 1 : -1];
+typedef char State_doubt_stands_at_520[offsetof(State, doubt) == 520 ? 1 : -1];
+typedef char State_motion_line_stands_at_524[offsetof(State, motion_line) == 524 ? 1 : -1];
+typedef char State_distance_line_stands_at_528[offsetof(State, distance_line) == 528 ? 1 : -1];
+typedef char State_distance_unnamed_line_stands_at_532[offsetof(State, distance_unnamed_line) == 532 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_536[offsetof(State, feed_mode_line) == 536 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_540[offsetof(State, rotary_refused) == 540 ? 1 : -1];
+typedef char State_note_count_stands_at_544[offsetof(State, note_count) == 544 ? 1 : -1];
+typedef char State_note_line_stands_at_584[offsetof(State, note_line) == 584 ? 1 : -1];
+typedef char State_note_word_stands_at_624[offsetof(State, note_word) == 624 ? 1 : -1];
+typedef char State_moved_mm_stands_at_664[offsetof(State, moved_mm) == 664 ? 1 : -1];
+typedef char State_misfits_stands_at_736[offsetof(State, misfits) == 736 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_740[offsetof(State, misfits_other_centre) == 740 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_744[offsetof(State, misfits_reversed) == 744 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_748[offsetof(State, misfits_exchanged) == 748 ? 1 : -1];
+typedef char State_spirals_stands_at_752[offsetof(State, spirals) == 752 ? 1 : -1];
+typedef char State_spiral_line_stands_at_756[offsetof(State, spiral_line) == 756 ? 1 : -1];
+typedef char State_spiral_start_stands_at_760[offsetof(State, spiral_start) == 760 ? 1 : -1];
+typedef char State_spiral_end_stands_at_768[offsetof(State, spiral_end) == 768 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_776[offsetof(State, spiral_unit_mm) == 776 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_784[offsetof(State, cutter_mode) == 784 ? 1 : -1];
+typedef char State_cutter_side_stands_at_788[offsetof(State, cutter_side) == 788 ? 1 : -1];
+typedef char State_cutter_code_stands_at_792[offsetof(State, cutter_code) == 792 ? 1 : -1];
+typedef char State_cutter_line_stands_at_796[offsetof(State, cutter_line) == 796 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_800[offsetof(State, cutter_radius_mm) == 800 ? 1 : -1];
+typedef char State_cutter_other_mm_stands_at_808[offsetof(State, cutter_other_mm) == 808 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_824[offsetof(State, cutter_entered) == 824 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_825[offsetof(State, cutter_failed) == 825 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_832[offsetof(State, cutter_normal) == 832 ? 1 : -1];
+typedef char State_held_turn_stands_at_848[offsetof(State, held_turn) == 848 ? 1 : -1];
+typedef char State_held_line_stands_at_852[offsetof(State, held_line) == 852 ? 1 : -1];
+typedef char State_held_from_stands_at_856[offsetof(State, held_from) == 856 ? 1 : -1];
+typedef char State_held_along_stands_at_872[offsetof(State, held_along) == 872 ? 1 : -1];
+typedef char State_held_centre_stands_at_888[offsetof(State, held_centre) == 888 ? 1 : -1];
+typedef char State_held_w_stands_at_904[offsetof(State, held_w) == 904 ? 1 : -1];
+typedef char State_held_sweep_stands_at_920[offsetof(State, held_sweep) == 920 ? 1 : -1];
+typedef char State_held_rows_stands_at_928[offsetof(State, held_rows) == 928 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_944[offsetof(State, cutter_rows_removed) == 944 ? 1 : -1];
+typedef char State_held_events_stands_at_952[offsetof(State, held_events) == 952 ? 1 : -1];
+typedef char State_corner_stands_at_960[offsetof(State, corner) == 960 ? 1 : -1];
+typedef char State_corner_line_stands_at_964[offsetof(State, corner_line) == 964 ? 1 : -1];
+typedef char State_corner_mm_stands_at_968[offsetof(State, corner_mm) == 968 ? 1 : -1];
+typedef char State_corner_from_mm_stands_at_976[offsetof(State, corner_from_mm) == 976 ? 1 : -1];
+typedef char State_corner_mm_s_stands_at_1000[offsetof(State, corner_mm_s) == 1000 ? 1 : -1];
+typedef char State_corner_rows_stands_at_1008[offsetof(State, corner_rows) == 1008 ? 1 : -1];
+typedef char State_corner_events_stands_at_1016[offsetof(State, corner_events) == 1016 ? 1 : -1];
+typedef char State_retract_stands_at_1024[offsetof(State, retract) == 1024 ? 1 : -1];
+typedef char State_retract_line_stands_at_1028[offsetof(State, retract_line) == 1028 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_1032[offsetof(State, unset_parameter) == 1032 ? 1 : -1];
+typedef char State_unset_line_stands_at_1036[offsetof(State, unset_line) == 1036 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_1040[offsetof(State, retract_unnamed_line) == 1040 ? 1 : -1];
+typedef char State_in_cycles_stands_at_1044[offsetof(State, in_cycles) == 1044 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_1048[offsetof(State, cycle_level_mm) == 1048 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_1056[offsetof(State, cycle_level_known) == 1056 ? 1 : -1];
+typedef char State_cycle_r_stands_at_1064[offsetof(State, cycle_r) == 1064 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_1072[offsetof(State, cycle_depth) == 1072 ? 1 : -1];
+typedef char State_cycle_q_stands_at_1080[offsetof(State, cycle_q) == 1080 ? 1 : -1];
+typedef char State_cycle_p_stands_at_1088[offsetof(State, cycle_p) == 1088 ? 1 : -1];
+typedef char State_cycle_line_stands_at_1096[offsetof(State, cycle_line) == 1096 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_1100[offsetof(State, cycle_plane) == 1100 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_1104[offsetof(State, cycle_unit_mm) == 1104 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_1112[offsetof(State, cycle_absolute) == 1112 ? 1 : -1];
+typedef char State_modal_call_stands_at_1116[offsetof(State, modal_call) == 1116 ? 1 : -1];
+typedef char State_modal_mm_stands_at_1120[offsetof(State, modal_mm) == 1120 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1152 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

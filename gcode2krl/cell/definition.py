@@ -7,7 +7,7 @@ Hähn & Weigold 2020. Every key carries its unit; `sections` has the tables.
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field
@@ -60,6 +60,7 @@ CODES_WITHOUT_SIGNALS = {
     "M30": "; program end (M30)",
 }
 """KRL of the M-codes that switch no signal of a cell; a cell file may replace it."""
+_WORK_OFFSET = r"^G(5[4-9]|59\.[123]|5(0[5-9]|[1-9]\d)|54\.1P([1-9]\d?|[12]\d\d|300))$"
 
 
 class Cell(Section):
@@ -85,9 +86,8 @@ class Cell(Section):
     mounted_tool: Annotated[int, Field(strict=True, ge=1, le=99999)] | None = None
     """The tool in the spindle when the program starts without a T word."""
     frames: Frames = Frames()
-    work_offsets: dict[
-        Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Frame
-    ] = Field(default_factory=dict)
+    work_offsets: dict[Annotated[str, Field(pattern=_WORK_OFFSET)], Frame] = Field(default_factory=dict)
+    """Zeros of the program; a Fanuc's G54.1 P3 is ``G54.1P3``."""
     external: dict[ExternalName, ExternalAxis] = Field(default_factory=dict)
     """Axes beside A1 to A6."""
     home: Home = Home()

@@ -73,7 +73,7 @@ def general(key: str) -> str:
     """Return a dotted key with ``*`` for the number of a tool and the names of offsets and joints."""
     key = re.sub(r"^tool\.\d+\.", "tool.*.", key)
     key = re.sub(r"^external\.E\d\.", "external.*.", key)
-    key = re.sub(r"^work_offsets\.(G59\.\d|G\d+)\.", "work_offsets.*.", key)
+    key = re.sub(r"^work_offsets\.(G59\.\d|G54\.1P\d+|G\d+)\.", "work_offsets.*.", key)
     return re.sub(r"^compliance\.virtual_joints\.\w+\.", "compliance.virtual_joints.*.", key)
 
 

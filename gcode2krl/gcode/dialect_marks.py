@@ -24,17 +24,28 @@ SKIPPED = ord("&")
 """A statement that says nothing to this robot."""
 SHIFT_SET, SHIFT_ADD = ord("="), ord("+")
 """``TRANS`` and ``ATRANS``: the axis words of the block are a shift of the zero, or are added to it."""
+CORNER_ROUND, CORNER_SIDE, CORNER_LENGTH = ord("1"), ord("2"), ord("3")
+"""The corner to the next block, the value being a radius (``RND=``, ``,R``), how much a chamfer takes of each
+side (``CHR=``, ``,C``), or the chamfer's length (``CHF=``)."""
+CYCLE, ARGUMENT, MODAL = ord("4"), ord("5"), ord("6")
+"""``CYCLE81``, the value being its number; each of its arguments, NaN where it is left out; ``MCALL``."""
+TURN_SET, TURN_ADD, TURN_DEG, TURN_OFF = ord("7"), ord("8"), ord("9"), ord("'")
+"""``ROT`` and a Fanuc's G68, ``AROT``, ``RPL=`` with its angle, and G69."""
 PROGRAM_NUMBER = ord(":")
 """``O1234`` alone in its line, where a program of that number begins."""
 
 HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP, TIP, FEED_AXES = range(12)
+MARKED, CYCLE_CALL, MODAL_CALL, TOOL_NAME, TURN = range(12, 17)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
-KIND_STEP = 16
+KIND_STEP = 32
 
 AS_WRITTEN, POINT_REQUIRED, THOUSANDTHS, CALCULATOR = range(4)
 """What a number without a decimal point is: units, an error, least increments, or units where it is sure."""
 MOST_CODES = 9999
 """Largest G number of a dialect, ten times: G999.9."""
-CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_REFUSED = -1, -2, -3, -4, -5
-"""Instead of a code of the core; exact stop of one block; call of a subprogram; ``CODE_REFUSED - k`` for the
-reason k."""
+CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_NO_OFFSET, CODE_TURN, CODE_TURN_OFF = range(
+    -1, -8, -1
+)
+CODE_OFFSET, CODE_REFUSED = -8, -9
+"""Instead of a code of the core; exact stop of one block; call of a subprogram; no work offset is in force;
+the coordinates are rotated, and are no more; a further work offset; ``CODE_REFUSED - k`` for the reason k."""

@@ -29,7 +29,7 @@ REASONS: Final = (
     ("fine boring and back boring move the tool sideways in the hole", "mill the hole, or bore with G85"),
     ("probing or a skip signal is not a motion this program can make", "probe on the controller"),
     ("threading needs a spindle geared to the motion", "mill the thread"),
-    ("the further work offsets are not in the cell", "use G54 to G59"),
+    ("G54.1 needs P, a whole number from 1 to 300", "write G54.1 P1"),
     ("a cycle of the control", "let the post write the cycle out in G0 and G1"),
     ("jumps, loops and subprograms of this control are not read", "let the post write the program out"),
     ("variables and calculations of this control are not read", "let the post write plain numbers"),
@@ -42,7 +42,10 @@ REASONS: Final = (
     ("the arc by its opening angle", "let the post write I and J, or CR="),
     ("smooth approach and retract", "let the post write them as G1, G2 and G3"),
     ("splines are not read", "let the post write G1, G2 and G3"),
-    ("a tool by its name", "let the post write the tool's number, as in [tool.N] of the cell"),
+    (
+        "no tool of the cell has this name",
+        'state name = "…" in [tool.N] of the cell, or let the post write the tool\'s number',
+    ),
     ("return from the reference point", "write G0 to the point"),
     ("a point of the machine", "remove the line: the robot goes to HOME by itself"),
     (
@@ -93,23 +96,52 @@ REASONS: Final = (
         "write a comment in ( ), a block in a line of its own",
     ),
     (
-        "the control would round or chamfer the corner to the next block",
+        "a corner is rounded or chamfered where a G1 in the plane follows another in the very next block,"
+        " both longer than the corner and with one feed",
         "let the post write the corner as G1, G2 and G3",
     ),
     (
         "0 repeats store the cycle and drill nothing, and whether the tool goes to X and Y is not sure",
-        "write the cycle in the block of its first hole, without L0 and K0",
+        "leave X and Y out of this block, and write both in that of the first hole",
     ),
     (
         "G10 is read as G10 L2 P1 to P6 with X, Y and Z, under G90 alone",
         "write it so, or remove the block and state offsets in [work_offsets] and [tool.N] of the cell",
+    ),
+    (
+        "corners that are all rounded alike, or have a feed of their own",
+        "write RND= in the block before each corner, and its feed as F",
+    ),
+    ("a cycle, and MCALL, stand in a block of their own", "give it a block of its own"),
+    (
+        "of CYCLE81 and CYCLE82 are read RTP at or above RFP plus SDIS, one depth, DP or DPR, below RFP, and"
+        " a dwell in seconds; the further numbers say nothing else (0; 10 for the way to count)",
+        "write CYCLE81(RTP,RFP,SDIS,DP), or let the post write the cycle out in G0 and G1",
+    ),
+    (
+        "behind G500 no work offset is in force, and the machine's own zero is not that of the part",
+        "write G54 to G57 again before the next motion; SUPA moves without one",
+    ),
+    ("under MCALL the cycle is drilled behind each move, behind this one too", "write MCALL alone before it"),
+    (
+        "a rotation is read in G17, about Z: ROT and AROT with RPL= or Z, G68 with X, Y and R under G90"
+        " where none is in force, in a block of its own",
+        _CAM,
+    ),
+    (
+        "while the coordinates are rotated the zero stays",
+        "end the rotation before it (G69, ROT), or write it first",
+    ),
+    (
+        "behind G68 and G69 the first move across the tool names X and Y under G90",
+        "write both coordinates in it",
     ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
-REASON_POLAR = _POLAR
+REASON_POLAR, REASON_OFFSET = _POLAR, _OFFSETS
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
@@ -117,6 +149,8 @@ REASON_NO_TIP, REASON_VECTOR_AND_ANGLE, REASON_VECTOR_ARC, REASON_OTHER_TIP = ra
 REASON_SHIFT_AND_TIP, REASON_ZERO_AND_TIP, REASON_FEED_AXES = range(38, 41)
 REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
 REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
+_CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZERO = range(46, 51)
+REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -140,6 +174,13 @@ class Dialect:
     """G numbers that are others of the core: 710 is 21."""
     exact: tuple[float, ...] = ()
     """G numbers of an exact stop in their block alone."""
+    offsets: tuple[float, ...] = ()
+    """G numbers of work offsets beyond those of LinuxCNC: G505 to G599, G54.1 with P."""
+    no_offset: tuple[float, ...] = ()
+    """G numbers after which no work offset is in force."""
+    turn: tuple[float, ...] = ()
+    """G numbers that rotate the coordinates about a point, and those that end it."""
+    turn_off: tuple[float, ...] = ()
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
     calls: tuple[float, ...] = ()
@@ -165,6 +206,8 @@ class Dialect:
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
     start: Mapping[str, float] = field(default_factory=dict)
     """State at the start, where it is stated by the control."""
+    tool_names: Mapping[str, int] = field(default_factory=dict)
+    """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -179,6 +222,10 @@ class Dialect:
             (d.CODE_HARMLESS, self.harmless),
             (d.CODE_EXACT, self.exact),
             (d.CODE_CALL, self.calls),
+            (d.CODE_OFFSET, self.offsets),
+            (d.CODE_NO_OFFSET, self.no_offset),
+            (d.CODE_TURN, self.turn),
+            (d.CODE_TURN_OFF, self.turn_off),
         ):
             for code in codes:
                 table[_tenfold(code)] = special
@@ -201,6 +248,7 @@ class Dialect:
     def names(self) -> tuple[NDArray[np.uint8], Ints32]:
         """Return the names of the statements, each with a line end behind it, and their kinds."""
         pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
+        pairs += [(f'"{name}"', _kind(d.TOOL_NAME, number)) for name, number in self.tool_names.items()]
         text = "".join(f"{name}\n" for name, _ in pairs).encode()
         return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
 
@@ -232,13 +280,11 @@ def _kind(kind: int, value: int = 0) -> int:
 
 _FANUC_REFUSED = {
     _TILTED: (53.1, 53.6, 54.2, 68.2, 68.3, 68.4),
-    _ROTATED: (68,),
     _SCALED: (51, 51.1),
     _POLAR: (12.1, 112, 16),
     _BORING: (76, 87),
     _PROBING: (31, 37),
     _THREAD: (33,),
-    _OFFSETS: (54.1,),
     _MODAL_CALL: (66, 66.1),
     _SPLINE: (6.2, 5.2),
     _RETURN: (29,),
@@ -252,9 +298,12 @@ _FANUC: dict[str, Any] = {
     "programs": d.PROGRAMS_FANUC,
     "syntax": d.SKIP_LEVEL | d.HEAD_LINES | d.MACROS,
     "calls": (65,),
+    "offsets": (54.1,),
+    "turn": (68,),
+    "turn_off": (69,),
     "same": {63: 64, 62: 64},
     "exact": (9,),
-    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69, 69.1, 103, 187),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69.1, 103, 187),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
@@ -286,15 +335,22 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.SHIFT, 0): ("TRANS",),
     _kind(d.JUMP): ("GOTO", "GOTOF", "GOTOB", "IF"),
     _kind(d.SHIFT, 1): ("ATRANS",),
-    _kind(d.REFUSED, _ROTATED): ("ROT", "AROT", "ROTS", "AROTS", "CROT"),
+    _kind(d.TURN, 0): ("ROT",),
+    _kind(d.TURN, 1): ("AROT",),
+    _kind(d.REFUSED, _ROTATED): ("ROTS", "AROTS", "CROT", "CROTS"),
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
-        *("MCALL", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
+        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
         *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
-        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84"),
-        *("CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
+        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE83", "CYCLE85"),
+        *("CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
     ),
+    _kind(d.CYCLE_CALL, 81): ("CYCLE81",),
+    _kind(d.CYCLE_CALL, 82): ("CYCLE82",),
+    _kind(d.MODAL_CALL): ("MCALL",),
+    _kind(d.REFUSED, _THREAD): ("CYCLE84", "CYCLE840"),
+    _kind(d.REFUSED, _BORING): ("CYCLE86",),
     _kind(d.REFUSED, _FLOW): (
         *("GOTOC", "GOTOS", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
         *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
@@ -302,7 +358,11 @@ _SINUMERIK_STATEMENTS = {
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
     _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
-    _kind(d.REFUSED, REASON_CORNER): ("RND", "RNDM", "CHF", "CHR", "FRC", "FRCM"),
+    _kind(d.MARKED, d.CORNER_ROUND - d.CORNER_ROUND): ("RND",),
+    _kind(d.MARKED, d.CORNER_SIDE - d.CORNER_ROUND): ("CHR",),
+    _kind(d.MARKED, d.CORNER_LENGTH - d.CORNER_ROUND): ("CHF",),
+    _kind(d.MARKED, d.TURN_DEG - d.CORNER_ROUND): ("RPL",),
+    _kind(d.REFUSED, _CORNERS): ("RNDM", "FRC", "FRCM"),
     _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
@@ -328,9 +388,10 @@ _LIST: Final = (
         own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
+        no_offset=(500,),
+        offsets=tuple(range(505, 600)),
         harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
         refused={
-            _OFFSETS: (500, *range(505, 600)),
             _THREAD: (33, 34, 35, 331, 332, 63),
             _POLAR: (110, 111, 112),
             _SMOOTH: (140, 141, 142, 143, 147, 148, 247, 248, 340, 341, 347, 348),

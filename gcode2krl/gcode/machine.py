@@ -56,7 +56,7 @@ MACHINE = StructOf(
 )
 """What the interpreter goes on with from block to block.
 
-``offsets`` are the work offsets G54 to G59.3 (9, 4): X, Y, Z in mm and the rotation about Z in degrees. G10
+``offsets`` are those of `state.WORK_OFFSETS` (n, 4): X, Y, Z in mm, rotation about Z in degrees. G10
 writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared. ``saved`` are the
 modes that M70 and M73 have saved, one row a level of calls. ``mounted_tool`` is the cell's, -1 where it
 states none.

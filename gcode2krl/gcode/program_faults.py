@@ -185,7 +185,8 @@ VALUE_REMEDIES: dict[int, str] = {
     FAULT_MACRO_POINT,
     FAULT_M98_MACRO,
     FAULT_M99_WORDS,
-) = range(30)
+    FAULT_LOCAL,
+) = range(31)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -249,6 +250,10 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_M98_MACRO: (
         "M98 takes P, the number of a program, and L, how often; P31234 is 3 times O1234",
         "write M98 P1234 L3",
+    ),
+    FAULT_LOCAL: (
+        "M97 of a Haas calls the lines from N of its P on to M99; N stands once in the file, in no loop",
+        "write N and this number at the first of these lines, and nowhere else",
     ),
     FAULT_M99_WORDS: (
         "words stand behind M99: M99 P would go on at a line of the caller",

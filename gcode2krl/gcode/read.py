@@ -18,7 +18,8 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
-from gcode2krl.gcode.dialects import DEFAULT, Dialect, dialect_of
+from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
+from gcode2krl.gcode.findings import DIALECT_STATEMENT
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
@@ -27,6 +28,7 @@ from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
 from gcode2krl.gcode.sense import machine_issues
+from gcode2krl.gcode.sentences import make_issue
 from gcode2krl.gcode.state import (
     DOUBT_OF_G,
     DOUBT_OF_GROUP,
@@ -162,7 +164,7 @@ def read_stream(
 
     ``folders`` are all in which a file of a subprogram may be.
     """
-    spoken = dialect_of(dialect, name)
+    spoken = replace(dialect_of(dialect, name), tool_names=tool_table.tools_by_name(cell))
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -268,8 +270,8 @@ def _size_of(stream: BinaryIO) -> int:
 
 
 def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
-    """Return G54 to G59.3 (9, 4), X, Y, Z in mm and the rotation about Z in degrees; and which are stated."""
-    offsets, known = np.zeros((9, 4)), np.zeros(9, dtype=np.bool_)
+    """Return the work offsets (n, 4), X, Y, Z in mm, rotation about Z in degrees; and which are stated."""
+    offsets, known = np.zeros((len(WORK_OFFSETS), 4)), np.zeros(len(WORK_OFFSETS), dtype=np.bool_)
     for name, frame in (cell.work_offsets if cell is not None else {}).items():
         if frame.b_deg or frame.c_deg:
             raise input_error(
@@ -408,6 +410,9 @@ class _Interpreter:
     def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
         known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
+        if self.state["corner"][0]:  # the program has ended before the block that makes it
+            line = int(self.state["corner_line"][0])
+            known.append(make_issue(DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
         found = [self._placed(issue) for issue in known]
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)

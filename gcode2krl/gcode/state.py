@@ -42,7 +42,7 @@ STATE = np.dtype(
         ("offset_tool", "i4"),  # whose length it is, -1 = G49
         ("exact_stop", "i1"),
         ("tolerance", "f8"),  # NaN = none
-        ("work_offset", "i4"),  # 0 = G54 … 8 = G59.3
+        ("work_offset", "i4"),  # its place in WORK_OFFSETS
         ("base_mm", "f8", 3),  # zero of the programmed numbers: work offset plus shift, before its rotation
         ("shift_mm", "f8", 3),  # by G52 and G92, in force
         ("shift_kept_mm", "f8", 3),  # what G92.3 restores
@@ -52,6 +52,9 @@ STATE = np.dtype(
         ("rotation_cos", "f8"),
         ("rotation_sin", "f8"),
         ("rotated", "i1"),  # the work offset in force is rotated
+        ("turned_deg", "f8"),  # by the program itself: ROT, G68
+        ("turned_about_mm", "f8", 2),  # the programmed point that stays
+        ("turned_anew", "i1"),  # a Fanuc's next move names X and Y
         ("offsets_taken", "i1"),  # the offsets of the start are in force
         ("home_28", "f8", 3),  # machine coordinates, mm
         ("home_30", "f8", 3),
@@ -62,7 +65,7 @@ STATE = np.dtype(
         ("tool_vector", "f8", 3),  # I, J, K under G43.5
         ("has_vector", "i1"),
         ("traori", "i1"),  # a Sinumerik's transformation is on: X, Y, Z are the tip
-        ("zero_in_doubt", "i1"),  # it was switched under a work offset, which the control may have dropped
+        ("zero_in_doubt", "i1"),  # ZERO_DROPPED, ZERO_OFF: which zero is in force is not known; 0 = it is
         ("length_code", "i4"),  # G43, G43.4, G43.5 or G49, tenfold
         ("feed_word", "f8"),  # F as written: degrees a minute of a turn alone
         ("arcs", "i4"),
@@ -115,6 +118,13 @@ STATE = np.dtype(
         ("held_rows", "i8", 2),  # its first row, and the one behind its last
         ("cutter_rows_removed", "i8"),  # rows of held arcs that have been taken away again, in all
         ("held_events", "i8"),  # events before it
+        ("corner", "i4"),  # CORNER_… that the next block has to make, 0 = none
+        ("corner_line", "i4"),
+        ("corner_mm", "f8"),
+        ("corner_from_mm", "f8", 3),  # where the move that leads to the corner begins
+        ("corner_mm_s", "f8"),
+        ("corner_rows", "i8"),  # rows and events behind that move: nothing may follow it
+        ("corner_events", "i8"),
         ("retract", "i4"),  # ten times 98 or 99
         ("retract_line", "i4"),  # where G98 or G99 was named last, 0 = nowhere, -1 = at the start
         ("unset_parameter", "i4"),  # the first numbered parameter that was read before it was set
@@ -131,6 +141,8 @@ STATE = np.dtype(
         ("cycle_plane", "i4"),
         ("cycle_unit_mm", "f8"),
         ("cycle_absolute", "i1"),
+        ("modal_call", "i4"),  # number of the cycle behind each move that follows (MCALL), 0 = none
+        ("modal_mm", "f8", 4),  # its heights: start, bottom, end; and its dwell in seconds
     ],
     align=True,  # as C lays it out
 )
@@ -164,6 +176,8 @@ MODES = np.dtype(
 )
 """What M70 saves: all modes but that of motion; the shift of G52 and G92 is no mode."""
 
+ZERO_DROPPED, ZERO_OFF = 1, 2
+"""The tip's transformation was switched under a work offset, which the control may have dropped; G500."""
 CUTTER_ON, CUTTER_BESIDE = 1, 2
 """Cutter compensation is on; G40 has left the tool beside the programmed point, until a straight move."""
 DOUBT_X, DOUBT_Y, DOUBT_Z, DOUBT_MOTION, DOUBT_FEED, DOUBT_UNIT = (1 << k for k in range(6))
@@ -279,7 +293,13 @@ _DOUBTS_OF_LETTER = {
 }
 DOUBT_OF_LETTER = np.array([_DOUBTS_OF_LETTER.get(letter, 0) for letter in v.ALPHABET], dtype=np.int32)
 """What is in doubt after a word whose value cannot be read, by its letter, (28,)."""
-WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+FIRST_G505, FIRST_G54_1, FURTHER_OFFSETS = 9, 104, 300
+"""Places of a Sinumerik's G505 and a Fanuc's G54.1 P1 among the work offsets, and how many P there are."""
+WORK_OFFSETS = (
+    *("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"),
+    *(f"G{number}" for number in range(505, 600)),
+    *(f"G54.1P{number}" for number in range(1, FURTHER_OFFSETS + 1)),
+)
 EVENT_TOOL, EVENT_SPINDLE, EVENT_COOLANT, EVENT_M, EVENT_TEXT = 0, 1, 2, 4, 5
 IMPLIED_M5 = -5
 """M number of a spindle stop that a tool change brings about."""

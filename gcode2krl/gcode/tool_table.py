@@ -55,6 +55,15 @@ def tools_from_cell(cell: "Cell | None") -> Tools:
     )
 
 
+def tools_by_name(cell: "Cell | None") -> dict[str, int]:
+    """Return the numbers of the tools that alone have their name, in capitals."""
+    tools = cell.tool if cell is not None else {}
+    names = [tool.name.upper() for tool in tools.values()]
+    return {
+        name: number for number, name in zip(tools, names, strict=True) if name and names.count(name) == 1
+    }
+
+
 def _by_number(lengths: dict[int, float]) -> Floats:
     table = np.full(max(lengths, default=0) + 1, np.nan)
     for number, length in lengths.items():

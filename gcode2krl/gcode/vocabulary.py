@@ -71,7 +71,7 @@ M48, M53 = 48, 53  # overrides, M48 to M53
 M61, M66 = 61, 66  # tool number, wait for an input
 M62, M63, M64, M65, M67, M68 = 62, 63, 64, 65, 67, 68  # outputs: on, off, on, off; values
 M70, M71, M72, M73 = 70, 71, 72, 73  # modal state: save, forget, restore, save and restore on return
-M98, M99 = 98, 99  # subprograms
+M97, M98, M99 = 97, 98, 99  # subprograms, M97 those of a Haas within its program
 
 L_TOOL, L_OFFSET, L_TOOL_FROM_POSITION, L_TOOL_FROM_FIXTURE, L_OFFSET_FROM_POSITION = 1, 2, 10, 11, 20
 """What G10 sets, its word L."""

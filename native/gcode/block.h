@@ -13,6 +13,8 @@ typedef struct {
     Ints32 line;
 } Words;
 
+enum { MOST_ARGUMENTS = 9 }; /* of CYCLE82 */
+
 /* One block, its words sorted: values by letter, G-codes by modal group and M-codes, -1 = none. */
 typedef struct {
     Machine *machine;
@@ -32,6 +34,16 @@ typedef struct {
     int32_t harmless;                         /* a code that says nothing, ten times */
     int32_t unit_again;                       /* G70 or G71, ten times */
     bool exact_once;                          /* an exact stop of this block alone */
+    uint8_t corner;                           /* CORNER_… to the next block, 0 = none */
+    double corner_value;
+    int32_t offset_code, offset;              /* G505 to G599 or G54.1, ten times, 0 = none; its place */
+    uint8_t turn;                             /* TURN_… of this block, 0 = none */
+    bool turn_stated;
+    double turned_deg;                        /* RPL= */
+    int32_t cycle;                            /* number of a Sinumerik's cycle, 0 = none */
+    bool modal;                               /* MCALL */
+    int32_t arguments;                        /* of the cycle, NaN = left out */
+    double argument[MOST_ARGUMENTS];
     double turn_deg[V_ROTARY_AXES]; /* where the rotary words lead, once they have been read */
 } Block;
 

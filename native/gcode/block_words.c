@@ -66,7 +66,9 @@ static bool is_unsupported_m(const Block *b, int64_t code) {
 }
 
 /* Tell whether an M-code jumps: native/gcode/execute.c does that. */
-static bool is_of_program(int64_t code) { return code == V_M98 || code == V_M99; }
+static bool is_of_program(const Machine *machine, int64_t code) {
+    return code == V_M98 || code == V_M99 || (code == V_M97 && machine->programs == D_PROGRAMS_FANUC);
+}
 
 /* Say that the program has to be read as a whole; return false, with a finding, in a dialect without that. */
 static bool want_program(Block *b, bool is_there) {
@@ -102,7 +104,7 @@ static Taken take_m(Block *b, double value) {
         report(b, F_UNSUPPORTED_M, (Says){.a = (double)(code * V_TENFOLD)});
         return faulty(0);
     }
-    if (is_of_program(code)) {
+    if (is_of_program(b->machine, code)) {
         const bool is_there = b->machine->programs == D_PROGRAMS_LINUXCNC || b->machine->programs == D_PROGRAMS_FANUC;
         return want_program(b, is_there) ? WITHOUT_DOUBT : faulty(S_DOUBT_ALL);
     }
@@ -260,8 +262,8 @@ BlockKind gather(Block *b, const Words *words, int64_t from, int64_t to, int32_t
         } else if (c == D_PROGRAM_NUMBER) { /* behind blocks another program begins */
             b->counts->program_wanted |= b->state->blocks > 0;
         } else if (c < '@') {
-            take_dialect_mark(b, c);
-            used = used || b->shift || b->tip;
+            take_dialect_mark(b, c, AT(words->value, k));
+            used = used || b->shift || b->tip || b->corner || b->turn || b->modal || b->cycle;
         } else {
             const Taken taken = take(b, c, AT(words->value, k));
             used = true;

@@ -131,7 +131,8 @@ static bool take_heights(Block *b, Cycle *c) {
 
 static bool take_repeats(Block *b, Cycle *c) {
     c->repeats = b->has[V_WORD_L] ? whole(b->word[V_WORD_L]) : 1;
-    return c->repeats > 0 || fails(b, 0, FC_REPEATS, (Says){.a = b->word[V_WORD_L]});
+    const bool stores = c->repeats == 0 && b->machine->repeats_by_k; /* a Fanuc keeps the words and drills nothing */
+    return c->repeats > 0 || stores || fails(b, 0, FC_REPEATS, (Says){.a = b->word[V_WORD_L]});
 }
 
 static bool take_dwell(Block *b, Cycle *c) {

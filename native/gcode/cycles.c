@@ -140,6 +140,8 @@ static void next_hole(const Block *b, Cycle *c, bool first) {
 
 /* Go to each hole in turn, at the height at which the tool stands before the first. */
 static void holes(Block *b, Cycle *c) {
+    if (c->repeats == 0)
+        return;
     double height = c->height;
     if (c->level < c->r) { /* the tool first rises where it stands; from nowhere it does so over the hole */
         go_along(b, c, c->r, c->r_known && c->level_known, RAPID_MM_S);
@@ -175,6 +177,19 @@ static bool has_cycle_room(Block *b, int64_t rows, int64_t events) {
 static void refuse(Block *b, const Cycle *c) {
     follow(b);
     b->state->doubt |= S_DOUBT_MOTION | S_DOUBT_X << c->third;
+}
+
+/* Drill where the tool stands, between heights that the cycle states; return false where there is no room. */
+bool drill_here(Block *b, const Cycle *c) {
+    State *s = b->state;
+    const int8_t exact_stop = s->exact_stop;
+    if (!has_cycle_room(b, ROWS_AROUND, 0))
+        return false;
+    s->exact_stop = 1; /* as for all cycles */
+    rapid_to(b, c, c->r);
+    hole(b, c);
+    s->exact_stop = exact_stop;
+    return true;
 }
 
 /* Carry out a canned cycle; return false where there is no room for its rows. */

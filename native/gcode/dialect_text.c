@@ -74,6 +74,18 @@ static bool names_corner(Bytes text, int64_t i) {
     return letter == 'R' || letter == 'C';
 }
 
+/* Write the corner to the next block whose comma stands at i: ,R2. or ,C1. */
+static int64_t comma_corner(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
+    const int64_t at = behind_blanks(scan->text, i + 1);
+    const Number size = number(scan->text, at + 1);
+    if (size.digits == 0 || size.finding != F_OK)
+        return refuse(scan, e, i, line, DR_REASON_CORNER);
+    if (scan->syntax & D_POINTS && lacks_point(scan->text, at))
+        put(scan, D_NEXT_POINTLESS, 0.0, line);
+    put(scan, (AT(scan->text, at) & ~CH_CASE_BIT) == 'R' ? D_CORNER_ROUND : D_CORNER_SIDE, size.value, line);
+    return size.end;
+}
+
 /* --- lines of other kinds ------------------------------------------------------------------------------- */
 
 /* Return the place behind :1234 or the name behind %, i where neither begins there. */
@@ -239,6 +251,39 @@ static bool are_linear(Bytes text, int64_t i) {
     return true;
 }
 
+static bool ends_argument(Bytes text, int64_t i) {
+    i = behind_blanks(text, i);
+    return stands_at(text, i, ',') || stands_at(text, i, ')');
+}
+
+/* Write a cycle and its arguments, whose parentheses open behind i. */
+static int64_t cycle_call(Scan *scan, Evaluation *e, int64_t i, int64_t number_of_cycle, int64_t line) {
+    const Bytes text = scan->text;
+    int64_t at = behind_blanks(text, i);
+    if (!stands_at(text, at, '('))
+        return refuse(scan, e, i, line, DR_REASON_HEIGHTS);
+    const int64_t end = after_arguments(text, at);
+    if (end == at || AT(text, end - 1) != ')')
+        return refuse(scan, e, i, line, DR_REASON_VALUES);
+    put(scan, D_CYCLE, (double)number_of_cycle, line);
+    for (at = behind_blanks(text, at + 1); at < end; at = behind_blanks(text, at + 1)) {
+        double value = NAN;
+        if (AT(text, at) != ',' && AT(text, at) != ')') {
+            const Number plain = number(text, at);
+            const bool is_plain = plain.digits > 0 && plain.finding == F_OK && ends_argument(text, plain.end);
+            if (!is_plain && e == NULL)
+                return NEEDS_LINE;
+            int64_t behind = is_plain ? plain.end : at;
+            value = is_plain ? plain.value : siemens_value(e, &behind);
+            if (!ends_argument(text, behind))
+                return refuse(scan, e, i, line, DR_REASON_VALUES);
+            at = behind_blanks(text, behind);
+        }
+        put(scan, D_ARGUMENT, value, line);
+    }
+    return end;
+}
+
 /* Write what the statement makes whose name stands from i to end. */
 static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
@@ -274,6 +319,13 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
     case D_SHIFT:
         put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
         return end;
+    case D_TURN: put(scan, kind / D_KIND_STEP == 0 ? D_TURN_SET : D_TURN_ADD, 0.0, line); return end;
+    case D_MARKED:
+        if (is_assigned)
+            return assigned(scan, e, D_CORNER_ROUND + kind / D_KIND_STEP, behind + 1, line, 0.0);
+        break;
+    case D_CYCLE_CALL: return cycle_call(scan, e, end, kind / D_KIND_STEP, line);
+    case D_MODAL_CALL: put(scan, D_MODAL, 0.0, line); return end;
     case D_REFUSED: return refuse(scan, e, i, line, kind / D_KIND_STEP);
     }
     if (stands_at(text, behind, ':')) { /* a label: jumps to it are refused */
@@ -281,6 +333,16 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
         return behind + 1;
     }
     return refuse(scan, e, i, line, DR_REASON_FLOW);
+}
+
+/* Write the tool whose name opens at i, T="MILL10". */
+static int64_t named_tool(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
+    const int64_t end = after_quotes(scan->text, i);
+    const int32_t kind = statement_kind(scan, i, end);
+    if (kind < 0)
+        return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
+    put(scan, 'T', kind / D_KIND_STEP, line);
+    return end;
 }
 
 /* X=5, S1=8000, M1=3: a word with its value behind =; i where none stands there. */
@@ -295,8 +357,10 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
     const int letter = AT(text, i) & ~CH_CASE_BIT;
     const bool numbered = behind > i + 1;
     const bool first_one = behind == i + 2 && AT(text, i + 1) == '1';
-    if (letter == 'T')
-        return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
+    if (letter == 'T' && !numbered && stands_at(text, behind_blanks(text, equals + 1), '"'))
+        return named_tool(scan, e, behind_blanks(text, equals + 1), line);
+    if (letter == 'T' && numbered)
+        return refuse(scan, e, i, line, DR_REASON_VALUES);
     if (numbered && letter <= 'C') {
         if (behind != i + 2 || AT(text, i + 1) != '3')
             return refuse(scan, e, i, line, DR_REASON_VECTORS);
@@ -357,7 +421,7 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
     if (syntax & D_MACROS && c == ';' && !first && is_word_behind(text, i + 1))
         return refuse(scan, e, i, line, DR_REASON_SEMICOLON);
     if (syntax & D_MACROS && c == ',' && names_corner(text, i + 1))
-        return refuse(scan, e, i, line, DR_REASON_CORNER);
+        return comma_corner(scan, e, i, line);
     if (syntax & D_STATEMENTS && c == '(') /* behind no name: a comment elsewhere, an alarm on this control */
         return refuse(scan, e, i, line, DR_REASON_PARENTHESES);
     if (syntax & D_SKIP_LEVEL && c == '/' && first && i + 1 < text.rows && is_digit(AT(text, i + 1))) {

@@ -57,9 +57,50 @@ bool take_component(Block *b, int axis, double value) {
     return !repeated;
 }
 
+/* Take the corner to the next block; of a Fanuc's size without a point its parameters decide. */
+static void take_corner(Block *b, uint8_t c, double value) {
+    const bool pointless = b->next_word == D_NEXT_POINTLESS, counts = b->next_word && !pointless;
+    b->next_word = 0;
+    if (pointless && b->machine->points == D_POINT_REQUIRED)
+        report(b, F_NO_POINT, (Says){.a = c == D_CORNER_ROUND ? V_WORD_R + 'A' : 'C', .b = value});
+    else if (counts || b->corner || !(value > 0.0))
+        refuse_statement(b, DR_REASON_CORNER);
+    b->corner = c;
+    b->corner_value = value * (pointless && b->machine->points == D_THOUSANDTHS ? in_inches(b) ? LEAST_INCH : LEAST : 1.0);
+}
+
+/* Take ROT, AROT, or the angle of one. */
+static void take_turn_of_frame(Block *b, uint8_t c, double value) {
+    if (b->next_word || (c == D_TURN_DEG ? !b->turn || b->turn_stated : b->turn != 0))
+        refuse_statement(b, DR_REASON_TURN);
+    b->next_word = 0;
+    if (c == D_TURN_DEG)
+        b->turn_stated = true, b->turned_deg = value;
+    else
+        b->turn = c;
+}
+
+/* Take MCALL, a cycle, or an argument of it. */
+static void take_call(Block *b, uint8_t c, double value) {
+    if (c == D_MODAL && !b->modal && !b->cycle)
+        b->modal = true;
+    else if (c == D_CYCLE && !b->cycle)
+        b->cycle = (int32_t)value;
+    else if (c == D_ARGUMENT && b->arguments < MOST_ARGUMENTS)
+        b->argument[b->arguments++] = value;
+    else
+        refuse_statement(b, c == D_ARGUMENT ? DR_REASON_HEIGHTS : DR_REASON_CYCLE_BESIDE);
+}
+
 /* Take what the scanner has marked: the next word, or something that says nothing. */
-void take_dialect_mark(Block *b, uint8_t c) {
-    if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
+void take_dialect_mark(Block *b, uint8_t c, double value) {
+    if (c >= D_CORNER_ROUND && c <= D_CORNER_LENGTH)
+        take_corner(b, c, value);
+    else if (c == D_TURN_SET || c == D_TURN_ADD || c == D_TURN_DEG)
+        take_turn_of_frame(b, c, value);
+    else if (c >= D_CYCLE && c <= D_MODAL)
+        take_call(b, c, value);
+    else if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
         take_shift(b, c);
     else if (c == D_TIP_ON || c == D_TIP_OFF || c == D_OTHER_TIP)
         take_tip(b, c);
@@ -92,6 +133,19 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
     if (code == D_CODE_HARMLESS) {
         note(b, S_NOTE_CODE, (int32_t)written);
         b->harmless = (int32_t)written;
+    } else if (code == D_CODE_TURN || (code == D_CODE_TURN_OFF && b->state->turned_deg != 0.0)) {
+        *good = b->turn == 0 || refuse(b, DR_REASON_TURN, (double)written);
+        b->turn = code == D_CODE_TURN ? D_TURN_SET : D_TURN_OFF;
+    } else if (code == D_CODE_TURN_OFF) {
+        note(b, S_NOTE_CODE, (int32_t)written);
+    } else if (code == D_CODE_OFFSET) {
+        *good = b->g[V_WORK_OFFSET] < 0;
+        if (!*good)
+            report(b, F_SAME_GROUP_G, (Says){.a = b->g[V_WORK_OFFSET], .b = (double)written});
+        b->g[V_WORK_OFFSET] = V_G59;
+        b->offset_code = (int32_t)written;
+    } else if (code == D_CODE_NO_OFFSET) {
+        b->state->zero_in_doubt = S_ZERO_OFF;
     } else if (code == D_CODE_EXACT) {
         b->exact_once = true;
     } else if (code <= D_CODE_REFUSED) {
@@ -114,7 +168,8 @@ static bool goes_by_point(const Block *b, int index) {
 static bool is_unsure(const Block *b, int index) {
     const int32_t length = b->g[V_LENGTH_OFFSET] >= 0 ? b->g[V_LENGTH_OFFSET] : b->state->length_code;
     const bool in_vector = length == V_G43_5 && index >= V_WORD_I && index <= V_WORD_K;
-    return index == V_WORD_F || (index == V_WORD_Q && in_cycle(b)) || in_vector;
+    const bool angle = index == V_WORD_R && b->turn && b->machine->points == D_THOUSANDTHS;
+    return index == V_WORD_F || angle || (index == V_WORD_Q && in_cycle(b)) || in_vector;
 }
 
 /* Return the least increment of a word: of an angle and a time it is the same in inches. */
@@ -184,6 +239,21 @@ static bool read_g10(Block *b) {
     return (offset && absolute && !b->has[V_WORD_R]) || refuse(b, DR_REASON_G10, V_G10);
 }
 
+/* G505 to G599, and G54.1 with P, are work offsets of the cell as G54 is. */
+static bool read_offset(Block *b) {
+    enum { G505 = 5050 };
+    const double p = b->word[V_WORD_P];
+    b->offset = S_FIRST_G505 + (b->offset_code - G505) / V_TENFOLD;
+    if (b->offset_code >= G505)
+        return true;
+    if (!b->has[V_WORD_P] || !is_whole(p) || p < 1.0 || p > S_FURTHER_OFFSETS)
+        return refuse(b, DR_REASON_OFFSET, b->offset_code);
+    b->offset = S_FIRST_G54_1 + (int32_t)p - 1;
+    b->has[V_WORD_P] = false;
+    b->pointless &= ~(1 << V_WORD_P);
+    return true;
+}
+
 /* Dwells and repeats of a drilling cycle. */
 static bool read_cycle(Block *b) {
     if (!in_cycle(b))
@@ -191,7 +261,8 @@ static bool read_cycle(Block *b) {
     if (b->has[V_WORD_P] && b->machine->whole_dwell_letter == V_WORD_P && !is_whole(b->word[V_WORD_P]))
         return refuse_statement(b, DR_REASON_TWICE);
     b->word[V_WORD_P] *= b->machine->cycle_dwell_s;
-    if (b->machine->repeats_by_k && ((b->has[V_WORD_K] && b->word[V_WORD_K] == 0.0) || (b->has[V_WORD_L] && b->word[V_WORD_L] == 0.0)))
+    const bool stored = (b->has[V_WORD_K] && b->word[V_WORD_K] == 0.0) || (b->has[V_WORD_L] && b->word[V_WORD_L] == 0.0);
+    if (b->machine->repeats_by_k && stored && (b->has[V_WORD_X] || b->has[V_WORD_Y]))
         return refuse_statement(b, DR_REASON_STORED);
     if (!b->machine->repeats_by_k || !b->has[V_WORD_K])
         return true;
@@ -311,8 +382,9 @@ static bool names_axis(const Block *b) {
 static bool is_zero_sure(Block *b) {
     if (b->g[V_WORK_OFFSET] >= 0 || b->g[V_NON_MODAL] == V_G53)
         return true;
+    const bool off = b->state->zero_in_doubt == S_ZERO_OFF;
     b->state->zero_in_doubt = 0;
-    return refuse_statement(b, DR_REASON_ZERO_AND_TIP);
+    return refuse_statement(b, off ? DR_REASON_NO_OFFSET : DR_REASON_ZERO_AND_TIP);
 }
 
 /* Codes that say nothing keep their own words; beside axis words nobody knows whose they are. */
@@ -334,7 +406,8 @@ static void leave_out_idle_words(Block *b) {
 /* Make the words of a block those of the core; return false, with a finding, where that cannot be. */
 bool to_core_words(Block *b) {
     leave_out_idle_words(b);
-    bool good = read_cycle(b);
+    bool good = !b->offset_code || read_offset(b);
+    good = read_cycle(b) && good;
     if (b->g[V_NON_MODAL] == V_G10 && b->machine->programs == D_PROGRAMS_FANUC)
         good = read_g10(b) && good;
     if (b->pointless)

@@ -197,6 +197,22 @@ static int locals_of(const Program *program) {
     return program->language == D_PROGRAMS_FANUC ? P_MACRO_LOCALS : P_LOCAL_PARAMETERS;
 }
 
+/* Call the lines from a word of the program at hand on, with its parameters. */
+int64_t call_lines(Run *run, int64_t word, int64_t times, int64_t next) {
+    Course *at = run->course;
+    if (at->frame + 1 >= run->program->frames.rows)
+        return stop_with(run, F_CALLS_TOO_DEEP, P_FRAMES - 1, next);
+    assign(run->program);
+    const Frame caller = *frame_of(run);
+    at->changes++;
+    at->frame++;
+    Frame *frame = frame_of(run);
+    *frame = (Frame){.return_to = next, .times = times - 1, .entry = word, .is_program = 1, .main_line = caller.main_line,
+                     .given = caller.given, .assigned = caller.assigned, .subprogram = caller.subprogram,
+                     .call_line = run->line, .repeats = (int32_t)at->repeats};
+    return enter(run, frame);
+}
+
 /* Call the subprogram of a row; `arguments` are none for M98, which keeps the caller's, and `given` their bits. */
 int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int64_t times, int64_t next) {
     Course *at = run->course;

@@ -30,6 +30,7 @@ double bracket_value(Evaluation *e, int64_t *i);
 int64_t jump(Run *run, int64_t word);
 int64_t row_of_number(Run *run, int64_t number);
 bool is_ready(Run *run, int64_t row);
+int64_t call_lines(Run *run, int64_t word, int64_t times, int64_t next);
 int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int64_t times, int64_t next);
 int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, int64_t next);
 int64_t flow(Run *run, const MarkedLine *marked, int64_t next);

@@ -9,6 +9,7 @@
 
 #include "gcode/block_words.h"
 #include "gcode/compensate.h"
+#include "gcode/corners.h"
 #include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/motion.h"
@@ -17,7 +18,9 @@
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/rows.h"
+#include "gcode/program_turn.h"
 #include "gcode/settings.h"
+#include "gcode/siemens_cycles.h"
 
 enum { ROWS_PER_BLOCK = 4, EVENTS_PER_BLOCK = 16 }; /* but for an arc or a cycle, and for messages */
 
@@ -33,7 +36,7 @@ static inline bool plain_block(Machine *machine, const Words *words, int64_t fro
     State *s = machine->state.at;
     const bool feeding = s->motion == V_MOTION_LINE;
     if ((!feeding && s->motion != V_MOTION_RAPID) || s->feed_mode != V_PER_MINUTE ||
-        s->doubt | s->rotary_unknown | s->cutter_mode)
+        s->doubt | s->rotary_unknown | s->cutter_mode | s->corner | s->modal_call | s->turned_anew | s->zero_in_doubt)
         return false;
     double x = 0.0, y = 0.0, z = 0.0, feed = s->feed;
     int named = 0;
@@ -210,6 +213,10 @@ static void stop(Block *b) {
 
 /* Execute a block whose words are sorted; return false where there is no room for its rows. */
 static bool execute(Block *b) {
+    if (b->modal || b->cycle)
+        return cycle_call(b);
+    if ((b->turn && !turn_frame(b)) || !may_stay_turned(b))
+        return true;
     const bool any_axis = names_axis(b), sets_offset = takes_axes(b, any_axis);
     if (sets_offset) {
         use_axes(b);
@@ -248,7 +255,9 @@ static bool execute(Block *b) {
             return true;
         if (b->state->cutter_mode & S_CUTTER_ON)
             tell_other_diameter(b);
-        if (!move(b))
+        if (b->state->turned_anew && !names_both(b))
+            return true;
+        if (!move(b) || !modal_cycle(b))
             return false;
     }
     report_unused(b);
@@ -280,9 +289,12 @@ static bool any_block(Machine *machine, const Words *words, int64_t from, int64_
     s->doubt |= doubt;
     const int8_t stops_exactly = s->exact_stop;
     s->exact_stop |= block.exact_once;
+    const int32_t corner_line = s->corner ? s->corner_line : 0;
     const bool done = execute(&block);
     if (block.exact_once && block.g[V_PATH_CONTROL] < 0)
         s->exact_stop = stops_exactly;
+    if (done)
+        refuse_open_corner(&block, corner_line);
     counts->mute = 0;
     if (!done) { /* an arc or a cycle needs more room than there is: as if the block had not begun */
         const int64_t rows_wanted = counts->rows_wanted, events_wanted = counts->events_wanted;

@@ -151,8 +151,9 @@ static int64_t call_macro(Run *run, const Words *words, int64_t from, int64_t to
 
 /* --- M98 and M99 ---------------------------------------------------------------------------------------- */
 
-/* Find which program M98 calls and how often: P1234 L3, or P31234; return false where that is not said. */
-static bool called(const Words *words, int64_t from, int64_t to, int64_t *number, int64_t *times) {
+/* Find which program M98 calls and how often: P1234 L3, or P31234; of M97 P is a line's number as a whole. Return false
+   where that is not said. */
+static bool called(const Words *words, int64_t from, int64_t to, bool local, int64_t *number, int64_t *times) {
     enum { OF_A_NUMBER = 10000 };
     double p = NAN, l = NAN;
     for (int64_t k = from; k < to; k++) {
@@ -167,7 +168,7 @@ static bool called(const Words *words, int64_t from, int64_t to, int64_t *number
     *times = 1;
     if (!whole_number(p, number) || *number < 1 || (!isnan(l) && (!whole_number(l, times) || *times < 0)))
         return false;
-    if (*number < OF_A_NUMBER)
+    if (local || *number < OF_A_NUMBER)
         return true;
     if (!isnan(l))
         return false;
@@ -176,23 +177,40 @@ static bool called(const Words *words, int64_t from, int64_t to, int64_t *number
     return *number > 0;
 }
 
-/* M98, behind the words `from` to `at`, which are carried out before the call. */
+/* Find the only line N of a number in all programs; NULL where there is none, or another. */
+static const Label *only_label(const Program *program, int64_t number) {
+    const Label *found = NULL;
+    for (int64_t row = 0; row < program->labels.rows; row++) {
+        if (AT(program->labels, row).number != number)
+            continue;
+        if (found != NULL)
+            return NULL;
+        found = &AT(program->labels, row);
+    }
+    return found;
+}
+
+/* M98, and M97 of a Haas, behind the words `from` to `at`, which are carried out before the call. */
 static int64_t call_behind(Run *run, const Words *words, int64_t from, int64_t at, int64_t to, int64_t next) {
     int64_t number, times;
     if (run->machine->counts.at->errors > 0) {
         run->course->is_stopped = 1;
         return next;
     }
-    if (!called(words, at + 1, to, &number, &times))
+    const bool local = AT(words->value, at) == V_M97;
+    if (!called(words, at + 1, to, local, &number, &times))
         return stop_at_fault(run, PF_FAULT_M98_MACRO, next);
-    const int64_t row = row_of_number(run, number);
-    if (row == WANTED_BY_NUMBER || !is_ready(run, row))
+    const Label *label = local ? only_label(run->program, number) : NULL;
+    if (local && (label == NULL || label->loop_first >= 0))
+        return stop_at_fault(run, PF_FAULT_LOCAL, next);
+    const int64_t row = local ? 0 : row_of_number(run, number);
+    if (!local && (row == WANTED_BY_NUMBER || !is_ready(run, row)))
         return WAIT;
     if (at > from && block_of_words(run, words, from, at, next) == WAIT)
         return WAIT;
     if (run->machine->counts.at->errors > 0 || run->machine->state.at->ended || run->course->is_stopped || times == 0)
         return next;
-    return call(run, row, NULL, 0, times, next);
+    return local ? call_lines(run, label->word, times, next) : call(run, row, NULL, 0, times, next);
 }
 
 /* M99, behind the words `from` to `at`, which are carried out before. */
@@ -219,7 +237,7 @@ int64_t macro_block(Run *run, const Words *words, int64_t from, int64_t to, int6
         const double value = AT(words->value, k);
         if (letter == 'G' && value == G65)
             return k == from ? call_macro(run, words, k + 1, to, next) : stop_at_fault(run, PF_FAULT_MACRO_WORDS, next);
-        if (letter == 'M' && value == V_M98)
+        if (letter == 'M' && (value == V_M98 || value == V_M97))
             return call_behind(run, words, from, k, to, next);
         if (letter == 'M' && value == V_M99)
             return end_behind(run, words, from, k, to, next);

@@ -4,6 +4,7 @@
 
 #include "gcode/arc_motion.h"
 #include "gcode/compensate.h"
+#include "gcode/corners.h"
 #include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/feed.h"
@@ -71,6 +72,10 @@ static bool straight(Block *b, bool by_machine) {
         stand_at(s, to_mm);
         return done;
     }
+    if (s->corner && may_round(b, to_mm, by_machine, mm_s) && !round_corner(b, to_mm))
+        return false;
+    const double from_mm[3] = {s->x, s->y, s->z};
+    const bool from_known = s->known_x && s->known_y && s->known_z;
     stand_at(s, to_mm);
     stand_turned(s, b->turn_deg);
     if (by_machine)
@@ -81,6 +86,8 @@ static bool straight(Block *b, bool by_machine) {
     note_time(b, time_s);
     if (by_machine)
         note_staying(b);
+    if (b->corner && from_known)
+        begin_corner(b, from_mm, by_machine, mm_s);
     return true;
 }
 

@@ -34,12 +34,22 @@ static double *offset_of(const Machine *machine, int32_t system) {
 
 static double in_rad(double deg) { return deg * (PI / 180.0); }
 
+/* Return the place of the work offset of a code, G54 to G59.3. */
+int32_t offset_of_code(int32_t code) { return code <= V_G59 ? (code - V_G54) / V_TENFOLD : code - V_G59 + 5; }
+
+/* Tell whether the work offset that a block selects is rotated. */
+bool turns_itself(const Block *b) {
+    const int32_t place = b->offset_code ? b->offset : offset_of_code(b->g[V_WORK_OFFSET]);
+    return offset_of(b->machine, place)[OFFSET_ROTATION] != 0.0;
+}
+
 /* Take over the offsets in force; the tip stands still. */
 void take_offsets(Machine *machine) {
     State *s = machine->state.at;
     const double *offset_mm = offset_of(machine, s->work_offset);
-    const double angle = in_rad(offset_mm[OFFSET_ROTATION]), rotation_cos = cos(angle), rotation_sin = sin(angle);
-    const bool rotates = offset_mm[OFFSET_ROTATION] != 0.0;
+    const double deg = s->turned_deg != 0.0 ? s->turned_deg : offset_mm[OFFSET_ROTATION];
+    const double angle = in_rad(deg), rotation_cos = cos(angle), rotation_sin = sin(angle);
+    const bool rotates = deg != 0.0;
     double tip_mm[3];
     tip_position(s, tip_mm);
     for (int axis = 0; axis < 3; axis++)
@@ -51,8 +61,8 @@ void take_offsets(Machine *machine) {
     s->rotated = rotates;
     s->rotation_cos = rotation_cos;
     s->rotation_sin = rotation_sin;
-    s->pivot_mm[0] = offset_mm[0];
-    s->pivot_mm[1] = offset_mm[1];
+    for (int axis = 0; axis < 2; axis++)
+        s->pivot_mm[axis] = s->turned_deg != 0.0 ? s->base_mm[axis] + s->turned_about_mm[axis] : offset_mm[axis];
     stand_with_tip_at(s, tip_mm);
 }
 
@@ -111,6 +121,8 @@ static void shift_by_words(Block *b, bool by_position) {
     }
     if (by_position)
         report_unknown(b, unknown_axes(b, false), stays);
+    if (b->shift == D_SHIFT_SET) /* TRANS stands for the whole frame of the program */
+        s->turned_deg = 0.0;
     note_moved(b, by_position ? S_NOTE_SHIFT : S_NOTE_LOCAL, s->shift_mm, shift_mm);
     for (int axis = 0; axis < 3; axis++)
         s->shift_mm[axis] = s->shift_kept_mm[axis] = shift_mm[axis];

@@ -29,6 +29,8 @@ static inline void tip_position(const State *s, double tip_mm[3]) {
 void unrotate(const State *s, double mm[3]);
 void stand_with_tip_at(State *s, const double tip_mm[3]);
 void take_offsets(Machine *machine);
+int32_t offset_of_code(int32_t code);
+bool turns_itself(const Block *block);
 bool offsets_rotary(Block *b);
 bool takes_axes(const Block *b, bool any_axis);
 void offset_codes(Block *b, bool any_axis);

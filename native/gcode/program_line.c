@@ -146,7 +146,9 @@ void read_line(Evaluation *e, int64_t start, int64_t first_message) {
             continue;
         }
         Item item = {.kind = NOTHING};
-        if (c == '#' && is_macro(e)) {
+        if (c == ',' && is_macro(e)) {
+            wrong(e, F_DIALECT_STATEMENT, DR_REASON_CORNER, 0.0, i);
+        } else if (c == '#' && is_macro(e)) {
             i = calculation_at(e, i);
         } else if (c == '#') {
             assignment_at(e, &i);

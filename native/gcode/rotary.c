@@ -157,7 +157,7 @@ void take_tip_code(Block *b) {
     if (!b->tip || tip == s->traori || !b->machine->rotary_axes)
         return;
     const bool had_tip = turn_mode(b->machine) != V_TURN_MACHINE;
-    s->zero_in_doubt = s->base_mm[0] != 0.0 || s->base_mm[1] != 0.0 || s->base_mm[2] != 0.0 || s->rotated;
+    s->zero_in_doubt = s->base_mm[0] != 0.0 || s->base_mm[1] != 0.0 || s->base_mm[2] != 0.0 || s->rotated ? S_ZERO_DROPPED : 0;
     s->traori = tip;
     s->has_vector = 0;
     if (had_tip != (turn_mode(b->machine) != V_TURN_MACHINE) && is_turned(s))

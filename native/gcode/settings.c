@@ -240,9 +240,9 @@ static void plane_and_unit(Block *b) {
 static void select_offset(Block *b, int32_t code) {
     State *s = b->state;
     s->zero_in_doubt = 0;
-    s->work_offset = code <= V_G59 ? (code - V_G54) / V_TENFOLD : code - V_G59 + 5;
+    s->work_offset = b->offset_code ? b->offset : offset_of_code(code);
     if (!AT(b->machine->offset_known, s->work_offset) && s->work_offset > 0)
-        report(b, F_OFFSET_UNKNOWN, (Says){.a = code});
+        report(b, F_OFFSET_UNKNOWN, (Says){.a = b->offset_code ? b->offset_code : code});
     take_offsets(b->machine);
 }
 

@@ -94,7 +94,7 @@ BEFORE = {
 
 
 def outcome(entry, lines, cell):
-    """Return the codes of all findings of some lines behind a head, and the last place (none if refused)."""
+    """Return the findings of some lines behind a head, and the last place (none if refused)."""
     dialect = entry.get("dialect", "linuxcnc")
     head = "G21 G90 G17\n" if entry.get("whole") else BEFORE[dialect]
     text = f"{head}{lines}\nM30\n"
@@ -103,17 +103,27 @@ def outcome(entry, lines, cell):
             io.BytesIO(text.encode()), "part.nc", over_demonstration(cell), dialect=dialect
         )
     except Gcode2KrlError as error:
-        return {issue.code for issue in error.issues}, None
-    return {i.code for i in toolpath.issues if i.severity != "note"}, toolpath.position_mm[-1].tolist()
+        return error.issues, None
+    return [i for i in toolpath.issues if i.severity != "note"], toolpath.position_mm[-1].tolist()
 
 
 @pytest.mark.parametrize("code", REMEDIES["code"])
 def test_who_follows_a_remedy_gets_the_program_it_promises(code):
     entry = REMEDIES["code"][code]
     refused, _ = outcome(entry, entry["refused"], None)
-    assert code in refused
+    assert code in {issue.code for issue in refused}
     found, tip = outcome(entry, entry["mended"], entry.get("cell"))
-    assert code not in found
+    assert code not in {issue.code for issue in found}
+    assert tip == pytest.approx(entry["tip"], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", REMEDIES["reason"])
+def test_who_follows_the_remedy_of_a_reason_gets_the_program_it_promises(name):
+    entry = REMEDIES["reason"][name]
+    refused, _ = outcome(entry, entry["refused"], None)
+    assert any(entry["says"] in issue.message + issue.remedy for issue in refused)
+    found, tip = outcome(entry, entry["mended"], entry.get("cell"))
+    assert not {issue.code for issue in found} & {"dialect-code", "dialect-statement"}
     assert tip == pytest.approx(entry["tip"], abs=1e-9)
 
 

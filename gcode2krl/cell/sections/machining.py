@@ -29,6 +29,8 @@ _ROUNDED_SHARE = 0.005
 class Tool(Provenance):
     """A cutter in its holder."""
 
+    name: OneLine = ""
+    """What a program calls the tool by, ``T="MILL10"`` on a Sinumerik."""
     model: str = ""
     kind: Literal["flat", "bull-nose", "ball", "tapered", "drill"] = "flat"
     diameter_mm: Positive

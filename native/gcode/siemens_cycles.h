@@ -1,0 +1,11 @@
+/* CYCLE81 and CYCLE82 of a Sinumerik, at once or behind each move (MCALL). */
+
+#ifndef GCODE_SIEMENS_CYCLES_H
+#define GCODE_SIEMENS_CYCLES_H
+
+#include "gcode/block.h"
+
+bool cycle_call(Block *block);
+bool modal_cycle(Block *block);
+
+#endif
