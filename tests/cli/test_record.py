@@ -25,6 +25,9 @@ from tests.online.test_twin import SLOT
 IDENTIFY = ROOT / "examples" / "identify"
 ANSWERS = ROOT / "examples" / "cells" / "answers" / "upside_down.toml"
 STOCK = 'based_on = "demonstration"\n[stock]\nbox_mm = [[0, -20, -30], [40, 20, 0]]\nresolution_mm = 0.5\n'
+LOG = "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n" + "".join(
+    f"{k / 100},{k / 50},{-90 + k / 50},90,{k / 100},{45 - k / 50},0\n" for k in range(200)
+)
 WELL = (
     ("translate", "part.nc", "-o", "part.src", "--tolerance", "0.05"),
     ("batch", "part.nc", "-o", "out", "--cache", "kept"),
@@ -43,6 +46,7 @@ WELL = (
     ("inspect", "part.nc"),
     ("identify", "stiffness", str(IDENTIFY / "holder.toml")),
     ("identify", "sensor", str(IDENTIFY / "orientations.csv"), "-o", "calibration.toml"),
+    ("runs", "import", "log.csv", "-o", "run-9"),
     ("online", "simulate", "slot.nc", "--cell", "cell.toml"),
     ("online", "replay", "run-1"),
     ("online", "serve", "--files", "rsi"),
@@ -66,6 +70,7 @@ REFUSED = (
     ("identify", "sensor", "no.csv"),
     ("identify", "force", "no"),
     ("identify", "controller", "no.csv"),
+    ("runs", "import", "no.csv", "-o", "run-9"),
     ("online", "simulate", "no.nc"),
     ("online", "replay", "no"),
     ("online", "serve", "--cell", "no.toml"),
@@ -90,6 +95,7 @@ def recorded(run, tmp_path):
     """Run a command with --json; returns its record, which the printed schema has been held against."""
     (tmp_path / "part.nc").write_text(CLEAN, encoding="ascii")
     (tmp_path / "slot.nc").write_text(SLOT, encoding="ascii")
+    (tmp_path / "log.csv").write_text(LOG, encoding="ascii")
     (tmp_path / "cell.toml").write_text(STOCK, encoding="ascii")
     schema = json.loads(run("models", "schema", "result").out)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -110,7 +116,7 @@ def recorded(run, tmp_path):
 
 
 def name_of(words):
-    return " ".join(words[:2]) if words[0] in ("models", "identify", "online", "cache") else words[0]
+    return " ".join(words[:2]) if words[0] in ("models", "identify", "online", "cache", "runs") else words[0]
 
 
 def test_the_lists_of_this_file_name_every_command_with_json():
