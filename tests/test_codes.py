@@ -31,6 +31,8 @@ NOT_CODES = {
     "pounds-force",
     "steps-post",
     "system-out",
+    "utf-16",
+    "xyz-fixed",
     "stiffness-map",
     "fanuc-calculator",
     "fanuc-increments",
