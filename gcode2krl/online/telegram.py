@@ -126,7 +126,7 @@ def answer_text(answer: Answer, settings: Online) -> bytes:
 
 
 def _elements(data: bytes) -> dict[str, dict[str, bytes]]:
-    """Return tag → attribute → value; a text has the attribute "". A tag may come once."""
+    """Return tag → attribute → value; a text has the attribute "". A tag or attribute may come once."""
     if len(data) > LONGEST:
         raise MalformedError("too long")
     if _NO_TEXT.search(data):
@@ -143,7 +143,10 @@ def _elements(data: bytes) -> dict[str, dict[str, bytes]]:
         tag = element[1].decode("ascii")
         if tag in elements:
             raise MalformedError(f"{tag} twice")
-        values = {name.decode("ascii"): value for name, value in _ATTRIBUTE.findall(element[2])}
+        attributes = _ATTRIBUTE.findall(element[2])
+        values = {name.decode("ascii"): value for name, value in attributes}
+        if len(values) < len(attributes):
+            raise MalformedError(f"an attribute of {tag} twice")
         if element[3] is not None:
             values[""] = element[3].strip()
         elements[tag], at = values, element.end()

@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gcode2krl.cell.sections.online import Online
@@ -89,6 +89,7 @@ def test_any_bytes_are_a_telegram_or_refused(data):
 
 @settings(max_examples=200, deadline=None)
 @given(st.integers(0, len(GOOD) - 1), st.binary(min_size=0, max_size=6))
+@example(GOOD.index(b' Y="') + 1, b"X")  # two X
 def test_a_telegram_with_a_piece_replaced_is_read_as_xml_would_be_or_refused(at, piece):
     data = GOOD[:at] + piece + GOOD[at + len(piece) :]
     try:
