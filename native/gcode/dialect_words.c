@@ -243,10 +243,11 @@ static bool read_g10(Block *b) {
 static bool read_offset(Block *b) {
     enum { G505 = 5050 };
     const double p = b->word[V_WORD_P];
-    b->offset = S_FIRST_G505 + (b->offset_code - G505) / V_TENFOLD;
-    if (b->offset_code >= G505)
+    if (b->offset_code >= G505) {
+        b->offset = S_FIRST_G505 + (b->offset_code - G505) / V_TENFOLD;
         return true;
-    if (!b->has[V_WORD_P] || !is_whole(p) || p < 1.0 || p > S_FURTHER_OFFSETS)
+    }
+    if (!b->has[V_WORD_P] || !is_whole(p) || p < 1.0 || p > S_FURTHER_OFFSETS) /* what follows goes on in the first offset */
         return refuse(b, DR_REASON_OFFSET, b->offset_code);
     b->offset = S_FIRST_G54_1 + (int32_t)p - 1;
     b->has[V_WORD_P] = false;
