@@ -10,8 +10,10 @@ the means over stretches of time says the same without the model, but of few str
 joined as scaled inverse chi2, and the excess is compared with a t distribution of their freedom (Smyth 2004).
 
 **What is loud for moments** is no part of that mean, since instruments have bursts and heavy tails. Where it
-is in step with the command it is none of theirs: of k loud moments so many fall by chance into the share of
-the time in which the command changes (binomial test), and their power must be a share of the noise's.
+is in step with the command it is none of theirs: of k events so many fall by chance into the share of the
+time in which the command changes (binomial test), and their power must be a share of the noise's. Loud
+moments near each other are one event, which is where it is loudest: a burst is loud a dozen times, and falls
+once.
 """
 
 import functools
@@ -39,6 +41,8 @@ _MOST_LAGS = 2000
 """Over which the autocovariance is summed; a slow part has forgotten by then."""
 _MOMENT_ROWS, _LOUD = 12, 4.0
 """Rows of a moment, and so many times the median moment's power is loud: of white noise one in 10^6."""
+_EVENT_S = 0.3
+"""Loud moments no farther apart are one event."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +178,7 @@ def _loud_in_step(traces: Sequence[Trace], left: Sequence[Floats], noise: Sequen
         return 0.0
     changes = [_by_moments(command_changes(each).astype(np.float64), each) for each in traces]
     is_changing = np.asarray(np.concatenate(changes).any(axis=1), dtype=np.bool_)
+    moment_s = _MOMENT_ROWS * max(float(np.median(np.diff(trace.time_s))) for trace in traces)
     shares = [0.0]
     for j, component in enumerate(noise):
         rows = [
@@ -181,7 +186,7 @@ def _loud_in_step(traces: Sequence[Trace], left: Sequence[Floats], noise: Sequen
             for rest, trace in zip(left, traces, strict=True)
         ]
         power = np.mean(np.concatenate(rows) ** 2, axis=1)
-        shares.append(_share_in_step(power, is_changing, len(noise)))
+        shares.append(_share_in_step(power, is_changing, len(noise), _EVENT_S / moment_s))
     return max(shares)
 
 
@@ -191,17 +196,25 @@ def _by_moments(values: Floats, trace: Trace) -> Floats:
     return np.concatenate([values[first:last] for first, last in whole]).reshape(-1, _MOMENT_ROWS)
 
 
-def _share_in_step(power: Floats, changes: Bools, components: int) -> float:
-    """Return the power of loud moments where the command changes (w,) over that of all; 0 if by chance."""
+def _share_in_step(power: Floats, changes: Bools, components: int, apart: float) -> float:
+    """Return the power of loud moments where the command changes (w,) over that of all; 0 if by chance.
+
+    ``apart``: moments between two events at least.
+    """
     from scipy.special import bdtrc
 
     usual = float(np.median(power)) if len(power) else 0.0
-    loud = power > _LOUD * usual
-    here = loud & changes
-    count = int(np.count_nonzero(here))
-    if usual == 0.0 or count < THRESHOLDS.beside.in_step_least:
+    loud = np.flatnonzero(power > _LOUD * usual)
+    if usual == 0.0 or len(loud) == 0:
         return 0.0
-    chance = components * bdtrc(count - 1, np.count_nonzero(loud), float(np.mean(changes)))
+    first = np.flatnonzero(np.diff(loud, prepend=-np.inf) > max(apart, 1.0))
+    loudest = np.repeat(np.maximum.reduceat(power[loud], first), np.diff(first, append=len(loud)))
+    in_step = np.logical_or.reduceat((power[loud] == loudest) & changes[loud], first)
+    count = int(np.count_nonzero(in_step))
+    if count < THRESHOLDS.beside.in_step_least:
+        return 0.0
+    chance = components * bdtrc(count - 1, len(first), float(np.mean(changes)))
+    here = loud[changes[loud]]
     return float(np.sum(power[here] - usual)) / (usual * len(power)) if chance < _LIMITS.loud_p else 0.0
 
 

@@ -87,7 +87,7 @@ class ChooseThresholds:
         "times the accuracy of a model without noise: a moment that is further off is a gap, however short",
     )
     model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
-    loud_p: float = convention(1e-3, "chance that so many loud moments fall where the command changes")
+    loud_p: float = convention(1e-3, "chance that so many loud events fall where the command changes")
     loud_share: float = calibrated(
         0.25,
         range(20_000, 21_000),
