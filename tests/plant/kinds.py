@@ -50,6 +50,12 @@ STORIES: dict[str, tuple[str, tuple[float, float] | None]] = {  # what happens, 
     "snag": ("open:cable_jerks_free", None),
 }
 """Plain events: what happens at which moment (`effects[].moments` of the label) has to be told."""
+COMMON = {
+    "servo_lag@all": (0.003, 0.03),  # s
+    "dead_time@all": (0.003, 0.03),
+    "backlash@all": (0.001, 0.02),  # deg
+}
+"""What six synchronised axes have alike: as large as on real arms, whatever the noise."""
 
 
 def draw_case(
@@ -94,7 +100,8 @@ def _plain(kind: str):
 
     def build(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
         drawn = str(rng.choice(SHELVES[kind]()))
-        return replace(options, effect=_known_form(options, drawn)), {}
+        effect = _known_form(options, drawn)
+        return replace(options, effect=effect, sized=COMMON.get(effect)), {}
 
     return build
 
