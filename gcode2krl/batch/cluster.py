@@ -178,7 +178,7 @@ def _connected(address: str) -> "Client":
     try:
         from distributed import Client
     except ImportError:
-        remedy = 'python -m pip install "gcode2krl[cluster]"'
+        remedy = install_command("cluster")
         raise input_error("cluster", "dask[distributed] is not installed", remedy) from None
     try:
         return Client(address, timeout=_CONNECT_S, set_as_default=False)

@@ -119,7 +119,11 @@ def recorded(run, tmp_path):
 
 
 def name_of(words):
-    return " ".join(words[:2]) if words[0] in ("models", "identify", "online", "cache", "runs", "tools") else words[0]
+    return (
+        " ".join(words[:2])
+        if words[0] in ("models", "identify", "online", "cache", "runs", "tools")
+        else words[0]
+    )
 
 
 def test_the_lists_of_this_file_name_every_command_with_json():
