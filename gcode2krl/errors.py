@@ -263,7 +263,7 @@ def input_error(
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs the packages of an extra beside the package, wherever that came from."""
+    """Return the command that installs the packages of an extra, wherever the package itself came from."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:
