@@ -262,8 +262,20 @@ def input_error(
     return NotUnderstoodError(Issue("error", code, line, message, remedy), source)
 
 
+def install_command(extra: str) -> str:
+    """Return the command that installs the packages of an extra, wherever the package itself came from."""
+    from importlib.metadata import PackageNotFoundError, requires
+
+    try:
+        stated = requires("gcode2krl") or []
+    except PackageNotFoundError:
+        stated = []
+    packages = [need.partition(";")[0].strip() for need in stated if extra in need.partition("extra ==")[2]]
+    return "python -m pip install " + " ".join(f'"{package}"' for package in packages)
+
+
 def extra_missing(extra: str, user: str, source: str = "") -> NotUnderstoodError:
     """Return the error for something whose packages a plain installation leaves out."""
-    remedy = f'python -m pip install "gcode2krl[{extra}]"'
+    remedy = install_command(extra)
     sentence = f"{user} needs packages that are not installed: the extra {extra}"
     return input_error("extra-missing", sentence, remedy, source=source)

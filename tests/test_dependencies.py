@@ -77,4 +77,4 @@ def test_a_3mf_is_read_with_its_extra(tmp_path):
         assert line.startswith(
             "stock.3mf: error: a 3MF file needs packages that are not installed: the extra 3mf"
         )
-        assert 'python -m pip install "gcode2krl[3mf]"' in line
+        assert 'python -m pip install "lxml>=5" "networkx>=3"' in line

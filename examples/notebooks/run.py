@@ -1,6 +1,6 @@
 """Run the notebooks of this folder and print what each cell took; python examples/notebooks/run.py
 
-Needs ``pip install "gcode2krl[notebook]"``. Nothing is written: the notebooks keep no outputs. With names of
+Needs ``pip install ".[notebook]"``. Nothing is written: the notebooks keep no outputs. With names of
 notebooks only these are run; ``--keep FOLDER`` leaves them there with their outputs.
 """
 

@@ -18,7 +18,7 @@ from gcode2krl.batch.crew import Answer
 from gcode2krl.batch.planning import program_digest
 from gcode2krl.batch.work import Made, Task, make
 from gcode2krl.compiled.threads import THREADS_VARIABLE
-from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.errors import NotUnderstoodError, input_error, install_command
 from gcode2krl.translation.inputs import cell_files, files_of_job, subprogram_files
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def _connected(address: str) -> "Client":
     try:
         from distributed import Client
     except ImportError:
-        remedy = 'python -m pip install "gcode2krl[cluster]"'
+        remedy = install_command("cluster")
         raise input_error("cluster", "dask[distributed] is not installed", remedy) from None
     try:
         return Client(address, timeout=_CONNECT_S, set_as_default=False)

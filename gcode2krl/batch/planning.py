@@ -6,8 +6,8 @@ A key names what a result depends on: the bytes of the part, the cell, the optio
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,10 +15,9 @@ from typing import Any
 
 from gcode2krl.batch.parts import Part
 from gcode2krl.batch.work import Task
-from gcode2krl.cell import Cell
 from gcode2krl.cell.library import models_folder
 from gcode2krl.compiled.core import core_digest
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.files.program_names import likely_text_bytes, program_stem
 from gcode2krl.krl import suggested_name
 from gcode2krl.krl.names import name_problem
@@ -31,6 +30,7 @@ from gcode2krl.translation.inputs import (
     require_search,
     subprogram_files,
 )
+from gcode2krl.translation.project import project_of
 from gcode2krl.version import __version__
 
 _PLACES = ("report", "job_path", "search")
@@ -56,50 +56,70 @@ class Planned:
 
 @dataclass(frozen=True)
 class _Cell:
-    """A cell under a job, and the files of both."""
+    """What a plan needs of a cell under a job; empty where it cannot be read."""
 
-    cell: Cell
-    sha256: str
-    files: tuple[Path, ...]
+    sha256: str = ""
+    files: tuple[Path, ...] = ()
+    externals: tuple[str, ...] = ()
 
 
-def plan(parts: Iterable[Part], order: Order, pages: bool = False) -> list[Planned]:
+def plan(
+    parts: Iterable[Part], order: Order, pages: bool = False, stated: Collection[str] | None = None
+) -> list[Planned]:
     """Return what to do for each part with the options of ``order``, and with ``pages`` a page for each.
 
-    Raises `NotUnderstoodError` where a cell or a job is wrong, or where two parts would have one output.
+    ``stated``: the options that no project file changes; None: there are no project files. Raises
+    `NotUnderstoodError` where a project file is wrong, where the cell or job of all parts is, or where two
+    parts would have one output; a wrong cell of some parts is told when these are translated.
     """
     require_search(order.search)
     listed = list(parts)
-    cells = {(part.cell, part.job): _read_cell(part) for part in listed}
-    names = {
-        part.key: program_name(part, cells[part.cell, part.job].cell.program.externals) for part in listed
-    }
+    orders = {part.key: _order_of(part, order, stated) for part in listed}
+    sources = {(own.cell_path, own.job_path) for own in orders.values()}
+    cells = {source: _read_cell(*source, alone=len(sources) == 1) for source in sources}
+    cell_of_part = {key: cells[own.cell_path, own.job_path] for key, own in orders.items()}
+    names = {part.key: program_name(part, cell_of_part[part.key].externals) for part in listed}
     refuse_collisions(listed, lambda part: names[part.key])
     notes = alike(listed, lambda part: names[part.key])
     return [
         replace(
-            _planned(part, cells[part.cell, part.job], order, f"{names[part.key]}.html" if pages else ""),
+            _planned(
+                part, cell_of_part[part.key], orders[part.key], f"{names[part.key]}.html" if pages else ""
+            ),
             note=notes.get(part.key),
         )
         for part in listed
     ]
 
 
-def _read_cell(part: Part) -> _Cell:
-    path = None if part.cell is None else str(part.cell)
-    job = None if part.job is None else str(part.job)
-    cell, _ = read_cell_under_job(path, job)
-    files = (*cell_files(path), *files_of_job(job))
-    return _Cell(cell, cell_of(cell, path)["sha256"], tuple(files))
-
-
-def _planned(part: Part, cell: _Cell, order: Order, page: str) -> Planned:
+def _order_of(part: Part, order: Order, stated: Collection[str] | None) -> Order:
+    """Return the order of a part: its cell and job where it has its own, else its project's."""
     own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
+    if stated is None:
+        return own
+    given = {name for name in ("cell_path", "job_path") if getattr(own, name) is not None}
+    project = project_of(part.file).without({*stated, *given}, {field.name for field in fields(Order)})
+    return replace(own, **project.options, project=project)
+
+
+def _read_cell(cell_path: str | Path | None, job_path: str | Path | None, *, alone: bool) -> _Cell:
+    """Return a cell under a job; one that cannot be read is empty, unless it is the only one."""
+    try:
+        cell, _ = read_cell_under_job(cell_path, job_path)
+        files = (*cell_files(cell_path), *files_of_job(job_path))
+    except Gcode2KrlError:
+        if alone:
+            raise
+        return _Cell()
+    return _Cell(cell_of(cell, cell_path)["sha256"], tuple(files), tuple(cell.program.externals))
+
+
+def _planned(part: Part, cell: _Cell, own: Order, page: str) -> Planned:
     try:
         size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
-    key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 else ""
+    key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 and cell.sha256 else ""
     inputs = (part.file, *cell.files, *(subprogram_files(own.part, own.search) if sha256 else ()))
     return Planned(part, Task(own, page), inputs, size_bytes, sha256, cell.sha256, key)
 
@@ -110,6 +130,8 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
     yield "part", Path(order.part).name
     yield "cell_name", Path(order.cell_path).name if order.cell_path is not None else None
     yield "page", page
+    if order.project.file is not None:
+        yield "project", (str(order.project.file), order.project.keys)
     subprograms = subprogram_files(order.part, order.search)
     if subprograms:
         yield "subprograms", [(file.name, sha256_of(file)) for file in subprograms]

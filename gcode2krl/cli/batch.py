@@ -12,7 +12,13 @@ from gcode2krl.cli.batch_lines import Told, as_record, shown, table_lines
 from gcode2krl.cli.cache import cache_options, chosen_cache
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import dialect_option, search_option, simplify_option
+from gcode2krl.cli.inputs import (
+    dialect_option,
+    isolated_option,
+    search_option,
+    simplify_option,
+    stated_options,
+)
 
 INTERRUPTED = 130
 
@@ -49,6 +55,7 @@ INTERRUPTED = 130
 @simplify_option
 @dialect_option
 @search_option
+@isolated_option
 @click.option("--block-delete", is_flag=True, help="Skip lines that begin with /.")
 @click.option("--allow", multiple=True, metavar="CODE", help="Allow all findings of a code; may be repeated.")
 @click.option("--strict", is_flag=True, help="Warnings refuse a program too.")
@@ -91,6 +98,7 @@ def command(
     cell_path: str | None,
     job_path: str | None,
     report: bool,
+    isolated: bool,
     verbose: bool,
     quiet: bool,
     as_json: bool,
@@ -112,7 +120,8 @@ def command(
     console = Console(quiet, as_json)
     before = read_results(Path(against)) if against is not None else None
     cell, job = (None if path is None else Path(path) for path in (cell_path, job_path))
-    planned = plan(find_parts(parts, cell, job), Order("", **options), report)
+    stated = None if isolated else stated_options(click.get_current_context())
+    planned = plan(find_parts(parts, cell, job), Order("", **options), report, stated)
     cache = None if no_cache else chosen_cache(cache_folder, cache_gb)
     out = Path(output)
     make_folder(out)
@@ -132,8 +141,8 @@ def command(
     seconds = time.perf_counter() - began_s
     code = INTERRUPTED if stopped else batch.exit_code
     if as_json:
-        stated = Order("", **options).options() | ({"report": True} if report else {})
-        console.json(as_record(batch, files, seconds, stated))
+        given = Order("", **options).options() | ({"report": True} if report else {})
+        console.json(as_record(batch, files, seconds, given))
     for text in table_lines(batch, out, seconds, stopped):
         console.say(text)
     return code

@@ -30,7 +30,8 @@ SCHEMA = "gcode2krl-cell.schema.json"
     "--controller",
     "archive",
     type=click.Path(path_type=Path),
-    help="Archive of the controller, folder or zip: states robot, limits, frames, load and HOME.",
+    help="Archive of the controller, folder or zip: states robot, limits, frames, load and HOME; or the URDF "
+    "or xacro of an arm that is not in the library.",
 )
 @click.option("--answers", "answers_path", type=click.Path(path_type=Path), help="Answers in a TOML file.")
 @click.option("--questions", is_flag=True, help="Print the questions as such a file, to be filled in.")
@@ -53,6 +54,7 @@ def command(
     Examples:
       gcode2krl init
       gcode2krl init --controller archive.zip
+      gcode2krl init --controller kr120_r3900.urdf
       gcode2krl init --questions > answers.toml
       gcode2krl init cell.toml --answers answers.toml
     """
@@ -152,6 +154,10 @@ def _write(cell_path: Path, text: str, inputs: list[Path]) -> None:
 def _say_read(console: Console, controller: "Controller") -> None:
     """Say what the archive states, and what of it no cell file can carry."""
     if not controller.source:
+        return
+    if controller.is_description:
+        lengths = " ".join(f"{mm:g}" for mm in controller.lengths_mm or ())
+        console.hint(f"{controller.source}: a1 a2 c1 c2 c3 c4 = {lengths} mm")
         return
     robot = controller.model or "not in the library"
     console.hint(f"{controller.source}: {controller.trafo_name or 'no name of the robot'} ({robot})")

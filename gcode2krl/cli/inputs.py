@@ -2,6 +2,8 @@
 
 import os
 from collections.abc import Sequence
+from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -40,7 +42,9 @@ __all__ = [
     "existing",
     "files_of_job",
     "gcode_options",
+    "isolated_option",
     "job_option",
+    "options_of_project",
     "read_cell",
     "read_cell_under_job",
     "read_part",
@@ -150,6 +154,39 @@ def job_option(function: Any) -> Any:
         help="What the CAM knows: its cutters and stock, laid over the cell.",
     )
     return option(function)
+
+
+def isolated_option(function: Any) -> Any:
+    """Add the option that takes no options from a project file."""
+    option = click.option("--isolated", is_flag=True, help="Take no options from a gcode2krl.toml.")
+    return option(function)
+
+
+def stated_options(context: click.Context) -> frozenset[str]:
+    """Return the names of the options that a command line states."""
+    default = click.core.ParameterSource.DEFAULT
+    return frozenset(name for name in context.params if context.get_parameter_source(name) is not default)
+
+
+def options_of_project(function: Any) -> Any:
+    """Let a command of one ``part`` take options from its project file: those that its line does not state.
+
+    The command gets what it took as ``project``.
+    """
+
+    @isolated_option
+    @wraps(function)
+    def command(part: str, isolated: bool, **options: Any) -> Any:
+        from gcode2krl.translation.project import Project, project_of
+
+        context = click.get_current_context()
+        stated = stated_options(context)
+        beside = Path("part") if part == STANDARD else Path(part)
+        project = Project() if isolated else project_of(beside).without(stated, options)
+        context.params.update(project.options)
+        return function(part=part, **(options | dict(project.options)), project=project)
+
+    return command
 
 
 def read_cell(path: str | None) -> "Cell":

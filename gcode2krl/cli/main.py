@@ -39,6 +39,7 @@ _COMMANDS = {
     "a check list.",
     "make-test": "Write a test program of air moves.",
     "cache": "What a batch has computed before: show, clear.",
+    "tools": "Cutters: take them from the library of a CAM system.",
     "models": "Robots, controllers, tools and cells: list, show, check, confirm, schema.",
     "install-hook": "Put gcode2krl into a CAM system's list of post processors.",
     "completion": "Print the script that completes commands, options and files in a shell.",

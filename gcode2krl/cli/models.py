@@ -59,15 +59,21 @@ def show(name: str) -> None:
 
 @command.command(
     "schema",
-    epilog=examples("gcode2krl models schema > cell.schema.json", "gcode2krl models schema result"),
+    epilog=examples(
+        "gcode2krl models schema > cell.schema.json",
+        "gcode2krl models schema project",
+        "gcode2krl models schema result",
+    ),
 )
-@click.argument("what", type=click.Choice(["cell", "result"]), default="cell")
+@click.argument("what", type=click.Choice(["cell", "project", "result"]), default="cell")
 def schema(what: str) -> None:
-    """Print the JSON schema of a cell file, for editors, or that of what --json prints."""
+    """Print the JSON schema of a cell or project file, for editors, or that of what --json prints."""
     from gcode2krl.cell import cell_schema
     from gcode2krl.result.model import result_schema
+    from gcode2krl.translation.project import project_schema
 
-    click.echo(json.dumps(cell_schema() if what == "cell" else result_schema(), indent=2))
+    schemas = {"cell": cell_schema, "project": project_schema, "result": result_schema}
+    click.echo(json.dumps(schemas[what](), indent=2))
 
 
 @command.command(

@@ -17,6 +17,7 @@ from gcode2krl.cli.inputs import (
     files_of_job,
     gcode_options,
     job_option,
+    options_of_project,
     read_cell_under_job,
     read_part,
     require_folder,
@@ -26,6 +27,7 @@ from gcode2krl.cli.inputs import (
 )
 from gcode2krl.cli.nominal import FILES, as_dict, compared, comparison_lines, solids, with_comparison
 from gcode2krl.errors import Gcode2KrlError, input_error
+from gcode2krl.translation.project import Project
 
 if TYPE_CHECKING:
     from gcode2krl.cutting.nominal import Comparison
@@ -67,6 +69,7 @@ _CORNERS = "corners.csv"
 )
 @click.option("--effects", "effect_folders", multiple=True, metavar="FOLDER", help="Folder of your effects.")
 @click.option("--no-forces", is_flag=True, help="Leave out material removal, forces and deflection.")
+@options_of_project
 def command(
     part: str,
     output: str | None,
@@ -89,6 +92,7 @@ def command(
     no_forces: bool,
     effects: tuple[str, ...],
     effect_folders: tuple[str, ...],
+    project: Project,
 ) -> int:
     """Predict what the robot will do: path, timing, joints, cutting forces, deflection.
 
@@ -109,7 +113,7 @@ def command(
         _require_outputs(folder, part_mesh, inputs)
         cell, of_job = read_cell_under_job(cell_path, job_path)
         toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect, search)
-        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job, *project.issues))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath
 
         with console.stages() as begin:
@@ -160,6 +164,7 @@ def command(
                 "max_force_N": loads.force_N if loads is not None else None,
                 "max_deflection_mm": loads.deflection_mm if loads is not None else None,
                 **({"nominal": as_dict(comparison)} if comparison is not None else {}),
+                **project.record,
             },
             prediction.issues,
             files=files,

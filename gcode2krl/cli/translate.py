@@ -8,7 +8,14 @@ import click
 from gcode2krl import krl_words as w
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import STANDARD, common_options, gcode_options, job_option, simplify_option
+from gcode2krl.cli.inputs import (
+    STANDARD,
+    common_options,
+    gcode_options,
+    job_option,
+    options_of_project,
+    simplify_option,
+)
 from gcode2krl.cli.restart import from_line_option, restart_words
 from gcode2krl.cli.standard_files import write_bytes
 from gcode2krl.errors import input_error
@@ -80,6 +87,7 @@ if TYPE_CHECKING:
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
 @from_line_option
+@options_of_project
 def command(as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 

@@ -22,7 +22,7 @@ from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.places import ProgramFiles, program_file, require_name
 from gcode2krl.krl.read import read_texts
-from gcode2krl.krl.release import header_words, released
+from gcode2krl.krl.release import header_words, matching, released
 from gcode2krl.krl.rsi_files import refuse_file_name
 from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
 from gcode2krl.krl.verify import VerifyReport, compare
@@ -91,6 +91,7 @@ def write_krl(
     joints: Joints | None = None,
     name: str | None = None,
     allow: Sequence[str] = (),
+    allow_where_found: Sequence[str] = (),
     guard: bool = True,
     split: Literal["defs", "files"] = "defs",
     options: str = "",
@@ -113,6 +114,7 @@ def write_krl(
     name : program name; default: the file's stem. A controller needs both alike.
     allow : findings released by hand, ``CODE:LINE``, ``CODE:FILE:LINE`` or ``CODE`` for all; the header
         lists them.
+    allow_where_found : the same for many programs: one that matches nothing here is left out.
     guard : compare frames, robot and inputs before the first motion.
     split : ``defs`` puts parts of a long program into subprograms of the same file, ``files`` into files.
     options : words for the header.
@@ -151,6 +153,7 @@ def write_krl(
     joints = robot.ptp_joints(targets, cell) if joints is None else joints
     arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
     found = [*of_name, *about_curves, *forecast.issues]
+    allow = (*allow, *matching(found, allow_where_found))
     issues = list(released(found, allow, strict))
     layout = Layout(
         guard,

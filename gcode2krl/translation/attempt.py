@@ -62,7 +62,7 @@ class Attempt:
             restart = restart_record(self.toolpath)
         return record_of(
             "translate",
-            self._figures() | restart,
+            self._figures() | restart | self.order.project.record,
             self.issues,
             exit_code=self.exit_code,
             input=self._input(),

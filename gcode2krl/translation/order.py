@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gcode2krl.files.program_names import DIALECT_NAMES
+from gcode2krl.translation.project import Project
 
-_NOT_OPTIONS = frozenset({"part", "output", "cell_path"})
+_NOT_OPTIONS = frozenset({"part", "output", "cell_path", "project"})
 """Fields that a record names elsewhere."""
 
 
@@ -46,6 +47,8 @@ class Order:
     comment_every: int | None = None
     from_line: int | None = None
     simplify_mm: float | None = None
+    project: Project = Project()
+    """Which of these options a file of the folder states."""
 
     def options(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as plain values of a record."""

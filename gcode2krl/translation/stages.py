@@ -147,7 +147,7 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
         order.dialect,
         order.search,
     )
-    known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job))
+    known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job, *order.project.issues))
 
 
 def _plan(order: Order, cell: "Cell", known: _Known) -> None:
@@ -190,7 +190,8 @@ def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> 
         ready.place,
         joints=_done(known.plan).joints,
         name=name,
-        allow=order.allow,
+        allow=() if "allow" in order.project.options else order.allow,
+        allow_where_found=order.project.options.get("allow", ()),
         guard=not order.no_guard,
         split=order.split,
         options=_header_words(order, ready.cell),
@@ -244,6 +245,7 @@ def _header_words(order: Order, cell: "Cell") -> str:
         "online": order.online,
         "both": order.both,
         "from_line": order.from_line,
+        "project": ",".join(order.project.keys) or None,
     }
     return " ".join(
         f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}"

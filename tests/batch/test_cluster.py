@@ -91,7 +91,7 @@ def test_no_scheduler_is_an_error(monkeypatch):
 
 def test_without_dask_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(NotUnderstoodError, match=r"gcode2krl\[cluster\]"), Cluster("tcp://127.0.0.1:1"):
+    with pytest.raises(NotUnderstoodError, match=r"dask\[distributed\]"), Cluster("tcp://127.0.0.1:1"):
         pass
 
 

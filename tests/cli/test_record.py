@@ -47,6 +47,7 @@ WELL = (
     ("identify", "stiffness", str(IDENTIFY / "holder.toml")),
     ("identify", "sensor", str(IDENTIFY / "orientations.csv"), "-o", "calibration.toml"),
     ("runs", "import", "log.csv", "-o", "run-9"),
+    ("tools", "import", "tool.tbl", "--unit", "mm", "--cell", "cell.toml"),
     ("online", "simulate", "slot.nc", "--cell", "cell.toml"),
     ("online", "replay", "run-1"),
     ("online", "serve", "--files", "rsi"),
@@ -71,6 +72,7 @@ REFUSED = (
     ("identify", "force", "no"),
     ("identify", "controller", "no.csv"),
     ("runs", "import", "no.csv", "-o", "run-9"),
+    ("tools", "import", "no.tbl"),
     ("online", "simulate", "no.nc"),
     ("online", "replay", "no"),
     ("online", "serve", "--cell", "no.toml"),
@@ -96,6 +98,7 @@ def recorded(run, tmp_path):
     (tmp_path / "part.nc").write_text(CLEAN, encoding="ascii")
     (tmp_path / "slot.nc").write_text(SLOT, encoding="ascii")
     (tmp_path / "log.csv").write_text(LOG, encoding="ascii")
+    (tmp_path / "tool.tbl").write_text("T77 P1 D6 ; 3 flute end mill\n", encoding="ascii")
     (tmp_path / "cell.toml").write_text(STOCK, encoding="ascii")
     schema = json.loads(run("models", "schema", "result").out)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -116,7 +119,11 @@ def recorded(run, tmp_path):
 
 
 def name_of(words):
-    return " ".join(words[:2]) if words[0] in ("models", "identify", "online", "cache", "runs") else words[0]
+    return (
+        " ".join(words[:2])
+        if words[0] in ("models", "identify", "online", "cache", "runs", "tools")
+        else words[0]
+    )
 
 
 def test_the_lists_of_this_file_name_every_command_with_json():

@@ -260,9 +260,12 @@ class _Writer:
 
     def _said(self, what: str, is_read: bool) -> Iterator[str]:
         """Yield where the values of a table come from: read in the archive, or typed."""
-        source = f"archive {self.controller.source}, {what}" if is_read else "typed at gcode2krl init"
-        yield f"source = {toml_value(source)}"
-        yield f'sure = "{"verified" if is_read else "memory"}"'
+        read = f"{self.controller.source}, its joints"
+        sure = "checked"
+        if not self.controller.is_description:
+            read, sure = f"archive {self.controller.source}, {what}", "verified"
+        yield f"source = {toml_value(read if is_read else 'typed at gcode2krl init')}"
+        yield f'sure = "{sure if is_read else "memory"}"'
 
 
 _NEEDED_BY_PROGRAMS = (

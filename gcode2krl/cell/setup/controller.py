@@ -13,6 +13,7 @@ from gcode2krl.cell import library
 from gcode2krl.cell.sections import Robot
 from gcode2krl.cell.setup.archive import VERSION, read_archive
 from gcode2krl.cell.setup.krl_data import Value, krl_values
+from gcode2krl.cell.setup.urdf import ENDINGS, read_arm
 
 Numbers = tuple[float, ...]
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -86,10 +87,24 @@ class Controller:
     externals: tuple[ExternalData, ...] = ()
     kss: str = ""
     """``8.3``, as the archive's own ``am.ini`` has it (``Version=V8.3.29``)."""
+    is_description: bool = False
+    """Read from a URDF: lengths, limits and speeds of the arm, nothing of a controller."""
 
 
 def read_controller(path: Path) -> Controller:
-    """Read the archive of a controller, a folder or a zip; raises `NotUnderstoodError` where it cannot."""
+    """Read the archive of a controller, a folder or a zip, or the URDF of an arm.
+
+    Raises `NotUnderstoodError` where it cannot.
+    """
+    if path.suffix.lower() in ENDINGS:
+        arm = read_arm(path)
+        return Controller(
+            source=path.name,
+            lengths_mm=arm.lengths_mm,
+            limits_deg=arm.limits_deg,
+            speeds_deg_s=arm.speeds_deg_s,
+            is_description=True,
+        )
     lists = read_archive(path)
     version = lists.pop(VERSION, None)
     values: dict[str, Value] = {}

@@ -80,7 +80,8 @@ def _only(frames: tuple[NamedFrame, ...]) -> int | None:
 def _robots(controller: Controller) -> list[Choice]:
     """Return the robots that can be it: an archive of another arm is no archive of this robot."""
     listed = [(name, "") for name in robots_of_lengths(controller.lengths_mm)]
-    own = [(OTHER, "not in this list: lengths and limits from the archive")] if controller.lengths_mm else []
+    where = "the file" if controller.is_description else "the archive"
+    own = [(OTHER, f"not in this list: lengths and limits from {where}")] if controller.lengths_mm else []
     return [*listed, *own]
 
 
