@@ -23,6 +23,9 @@ _CHANCE = 0.01
 _TAILS = 1.5
 """So much further off is an outlier: a model that is not whole leaves longer tails than noise. Our choice."""
 _ROUNDS = 4
+_WIDTH_ROUNDS = 6
+_NARROWEST, _WIDEST = 0.05, 5.0
+"""By how much the widths of a group may be scaled together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,10 @@ class _Fitting:
         self._model, self._measured = model, measured_mm
         self._steps = steps_of(model)
         self._has_width = np.isfinite(model.widths)
+        self._precision = self._has_width.astype(float)
+        """(p,) 1/width² in units of the steps."""
+        groups = np.array([number.group for number in model.numbers])
+        self._groups = [self._has_width & (groups == group) for group in dict.fromkeys(groups)]
         self._u = np.zeros(len(self._steps)) if start is None else start / self._steps
 
     def off(self) -> Floats:
@@ -110,8 +117,20 @@ class _Fitting:
     def plain(self, rows: Bools, all_rows: Bools) -> Fit:
         """Minimise squares and return the fit."""
         sigma = self.squares(rows, self._spread(rows))
+        for _ in range(_WIDTH_ROUNDS):
+            self._widen(self._noise(rows, sigma)[2])
+            self._minimise(rows, sigma, "linear")
+            sigma = self._noise(rows, sigma)[0]
         sigma, freedom, covariance, slopes = self._noise(rows, sigma)
         return Fit(self._u * self._steps, sigma, covariance, all_rows & ~rows, slopes, freedom)
+
+    def _widen(self, covariance: Floats) -> None:
+        """Scale the widths of each group together to what its numbers are (expectation maximisation)."""
+        power = self._u**2 + np.diag(covariance) / self._steps**2
+        for group in self._groups:
+            if group.sum() > 1:
+                scale = np.clip(power[group].mean(), _NARROWEST**2, _WIDEST**2)
+                self._precision[group] = 1.0 / scale
 
     def _spread(self, rows: Bools) -> float:
         """Return the noise of a coordinate by the median of their sizes."""
@@ -123,7 +142,7 @@ class _Fitting:
         flat = slopes[rows].reshape(-1, slopes.shape[2])
         scaled = flat * self._steps
         normal = scaled.T @ scaled
-        inverse = np.linalg.inv(normal + sigma**2 * np.diag(self._has_width.astype(float)) + 1e-9 * np.diag(np.diag(normal)))
+        inverse = np.linalg.inv(normal + sigma**2 * np.diag(self._precision) + 1e-9 * np.diag(np.diag(normal)))
         told = float(np.trace(inverse @ normal))
         freedom = max(len(flat) - told, 1.0)
         left = self.off()[rows]
@@ -132,7 +151,7 @@ class _Fitting:
         return sigma, freedom, covariance, flat
 
     def _minimise(self, rows: Bools, sigma: float, loss: str) -> None:
-        weight = self._has_width.astype(float)
+        weight = np.sqrt(self._precision)
         measured = self._measured[rows]
 
         def residual(u: Floats) -> Floats:
