@@ -1,7 +1,7 @@
-"""Made-up arms that are measured in poses: Denavit-Hartenberg with 4x4 matrices, own masses, own air, own clock.
+"""Made-up arms that are measured in poses: Denavit-Hartenberg with 4x4 matrices, own masses, own air.
 
-It shares no code with gcode2krl. An arm is that of Brandstoetter, Angerer and Hofbaur 2014, written as rows of
-theta, d, a, alpha and Hayati's beta; its errors are errors of these.
+It shares no code with gcode2krl. An arm is that of Brandstoetter, Angerer and Hofbaur 2014, written as rows
+of theta, d, a, alpha and Hayati's beta; its errors are errors of these.
 """
 
 from dataclasses import dataclass, field
@@ -181,13 +181,21 @@ def _directions(rng: np.random.Generator, count: int) -> np.ndarray:
     return drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
 
 
-KR300 = MadeUp("KR 300 R2500 ultra", (350, 41, 0, 675, 1150, 1000, 240), (-1, 1, 1, -1, 1, -1), (0, -90, 0, 0, 0, 0))
+KR300 = MadeUp(
+    "KR 300 R2500 ultra", (350, 41, 0, 675, 1150, 1000, 240), (-1, 1, 1, -1, 1, -1), (0, -90, 0, 0, 0, 0)
+)
 MAKERS = (
     KR300,
     MadeUp("KR 6 R900-2", (25, -25, 0, 400, 455, 420, 90), (-1, 1, 1, -1, 1, -1), (0, -90, 0, 0, 0, 0)),
     MadeUp("ABB IRB 120-3/0.6", (0, -70, 0, 290, 270, 302, 72)),
     MadeUp("ABB IRB 2400-10", (100, -135, 0, 615, 705, 755, 85), a3_by_a2=-1.0),
-    MadeUp("FANUC M-10iA", (150, -200, 0, 450, 600, 640, 100), (1, 1, -1, -1, -1, -1), (0, 0, -90, 0, 0, 180), 1.0),
+    MadeUp(
+        "FANUC M-10iA",
+        (150, -200, 0, 450, 600, 640, 100),
+        (1, 1, -1, -1, -1, -1),
+        (0, 0, -90, 0, 0, 180),
+        1.0,
+    ),
     MadeUp("Staeubli TX40", (0, 0, 35, 320, 225, 225, 65), offsets_deg=(0,) * 6),
 )
 
@@ -198,7 +206,37 @@ def clean(arm: MadeUp, seed: int, reach_mm: float = 2500.0) -> MadeUp:
     size = {"theta": 0.02 * DEG, "alpha": 0.2e-3, "beta": 0.2e-3, "a": 0.2, "d": 0.2}
     share = sum(arm.lengths_mm[3:]) / reach_mm
     errors = {name: size[name.split()[0]] * rng.normal() for name in SEVENTEEN}
-    return _but(arm, errors={n: e * (share if n[0] in "ad" and n.split()[0] in "ad" else 1.0) for n, e in errors.items()})
+    return _but(
+        arm,
+        errors={n: e * (share if n[0] in "ad" and n.split()[0] in "ad" else 1.0) for n, e in errors.items()},
+    )
+
+
+def truth(arm: MadeUp) -> dict[str, float]:
+    """Errors of a clean arm by the names, units and signs of ``identify kinematics``: deg, mm, mrad.
+
+    Its forearm is tilted about a line through the wrist, here about one through the elbow: that moves b.
+    """
+    e = dict.fromkeys(SEVENTEEN, 0.0) | arm.errors
+    return {
+        "A2 zero": e["theta 2"] / DEG,
+        "A3 zero": e["theta 3"] / DEG,
+        "A4 zero": -e["theta 4"] / DEG,
+        "A5 zero": e["theta 5"] / DEG,
+        "a1": e["a 1"],
+        "c2": e["a 2"],
+        "a2": e["a 3"],
+        "c3": e["d 4"],
+        "b": e["d 3"] - arm.lengths_mm[5] * e["alpha 3"],
+        "A2 tilt": 1e3 * e["alpha 1"],
+        "A3 twist": 1e3 * e["alpha 2"],
+        "A3 tilt": -1e3 * e["beta 2"],
+        "A4 tilt": -1e3 * e["alpha 3"],
+        "A5 tilt": -1e3 * e["alpha 4"],
+        "A6 tilt": -1e3 * e["alpha 5"],
+        "A5 beside A4": -e["a 4"],
+        "A5 across": e["d 5"],
+    }
 
 
 def hard(arm: MadeUp, seed: int) -> MadeUp:
@@ -225,3 +263,23 @@ def hard(arm: MadeUp, seed: int) -> MadeUp:
 
 def _but(arm: MadeUp, **changes) -> MadeUp:
     return MadeUp(**{**arm.__dict__, **changes})
+
+
+def write_example(file) -> None:
+    """The table of examples/identify/poses.csv: a KR 300 with 17 errors, weight, play and some wrong rows."""
+    arm = _but(hard(KR300, 4), outliers=0.01, drift_mm=(0.0, 0.0, 0.0))
+    table = measured(arm, 300, 5, again=12)
+    q = ",".join(f"q{j}_deg" for j in range(1, 7))
+    sides = ",".join(f"approach_{j}" for j in range(1, 7))
+    lines = [f"{q},x_mm,y_mm,z_mm,{sides}"]
+    for joints, seen, side in zip(table.q_deg, table.seen_mm, table.approach, strict=True):
+        words = [f"{v:.4f}" for v in joints] + [f"{v:.4f}" for v in seen] + [f"{v:.0f}" for v in side]
+        lines.append(",".join(words))
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    import sys
+    from pathlib import Path
+
+    write_example(Path(sys.argv[1]))

@@ -1,9 +1,10 @@
-"""A robot's own geometry from measured poses: frames, zeros, lengths, parallelism, bending and play at once."""
+"""A robot's own geometry from measured poses: frames, zeros, lengths, axes, bending and play at once."""
 
-from gcode2krl.identify.kinematics.arms import Arm, arm_of, arms
+from gcode2krl.identify.kinematics.arms import Arm, all_arms, arm_named, arm_of
 from gcode2krl.identify.kinematics.identification import (
     Geometry,
     Options,
+    Part,
     identify_kinematics,
 )
 from gcode2krl.identify.kinematics.readings import Readings, read_readings
@@ -12,9 +13,11 @@ __all__ = [
     "Arm",
     "Geometry",
     "Options",
+    "Part",
     "Readings",
+    "all_arms",
+    "arm_named",
     "arm_of",
-    "arms",
     "identify_kinematics",
     "read_readings",
 ]

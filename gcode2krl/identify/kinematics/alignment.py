@@ -1,8 +1,9 @@
 """Where the instrument stands and where its targets are on the tool, before any small error is known.
 
-A target p on the flange is seen at m = R·(F p + o) + t, with the flange F, o by the joints. With X = Rᵀ and y = Rᵀ t
-this is linear, X m - y - F p = o, for any scale and handedness of X: they tell a wrong unit and a mirrored table
-(Shah 2013 solves the like for hand and eye). Readings that are far off are left out by taking the best of many small draws.
+A target p on the flange is seen at m = R·(F p + o) + t, with the flange F, o by the joints. With X = Rᵀ and y
+= Rᵀ t this is linear, X m - y - F p = o, for any scale and handedness of X: they tell a wrong unit and a
+mirrored table (Shah 2013 solves the like for hand and eye). Readings that are far off are left out by taking
+the best of many small draws.
 """
 
 from typing import NamedTuple
@@ -32,7 +33,7 @@ class Alignment(NamedTuple):
 
 
 def aligned(measured_mm: Floats, target: np.ndarray, flange_mm: Floats, rotation: Floats) -> Alignment:
-    """Return frames that fit points (n, 3) of targets (n,) seen from an arm with flanges (n, 3), (n, 3, 3)."""
+    """Return frames that fit points (n, 3) of targets (n,) on an arm with flanges (n, 3), (n, 3, 3)."""
     design, wanted = _design(measured_mm, target, rotation), flange_mm
     rng = np.random.default_rng(1)
     best, kept = np.inf, np.ones(len(wanted), dtype=bool)

@@ -31,6 +31,8 @@ class Arm:
     a3_by_a2: float = 0.0
     """By this times A2 the angle between the links differs from the controller's A3."""
     source: str = ""
+    is_kuka: bool = False
+    """A cell can hold it."""
 
     def kuka_rad(self, q_rad: Floats) -> Floats:
         """Return the joints (n, 6) in KUKA's signs and zero, from those of the arm's own controller."""
@@ -64,7 +66,7 @@ def arm_of(cell: Cell) -> Arm:
 
 
 def _kuka(model: str, mm: Floats) -> Arm:
-    return Arm(model, mm, np.array(_KUKA_SIGNS), RAD_PER_DEG * np.array(_KUKA_OFFSETS_DEG))
+    return Arm(model, mm, np.array(_KUKA_SIGNS), RAD_PER_DEG * np.array(_KUKA_OFFSETS_DEG), is_kuka=True)
 
 
 def arm_named(model: str) -> Arm:

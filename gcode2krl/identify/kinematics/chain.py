@@ -49,7 +49,7 @@ class Chain:
         self.motions[name] = Motion(axis, False, np.broadcast_to(np.asarray(nominal, float), self.rows))
 
     def walk(self, theta: Floats) -> tuple[Floats, Floats, dict[str, tuple[Floats, Floats]]]:
-        """Return tips (n, 3), rotations (n, 3, 3), and by motion its axis and the place where it acts (n, 3)."""
+        """Return tips (n, 3), rotations (n, 3, 3), and by motion its axis and where it acts (n, 3)."""
         columns = [np.tile(unit, (self.rows, 1)) for unit in np.eye(3)]
         place = np.zeros((self.rows, 3))
         acts = {}

@@ -1,9 +1,9 @@
 """Robust regularised least squares of the small numbers, on some rows, and what the rows tell of them.
 
-Minimised is sum rho(|residual|²/sigma²) + sum (theta/width)², with scipy's ``least_squares`` and its soft_l1; then rows
-that are far off are left out and the plain squares are minimised, since soft_l1 alone wastes some of the good rows.
-Rows are of equal and independent noise, which is learnt from what they leave: numbers that no row tells keep
-their width.
+Minimised is sum rho(|residual|²/sigma²) + sum (theta/width)², with scipy's ``least_squares`` and its soft_l1;
+then rows that are far off are left out and the plain squares are minimised, since soft_l1 alone wastes some
+of the good rows. Rows are of equal and independent noise, which is learnt from what they leave: numbers that
+no row tells keep their width.
 """
 
 from dataclasses import dataclass
@@ -38,6 +38,8 @@ class Fit:
     """1-sigma of one coordinate, as the rows leave it."""
     covariance: Floats
     """(p, p) beside the widths."""
+    by_rows: Floats
+    """(p,) 1-sigma of each number by the rows and the others' widths alone; inf where it is not told."""
     is_outlier: Bools
     """(n,) among the rows that were fitted."""
     slopes: Floats
@@ -52,7 +54,9 @@ def steps_of(model: Model) -> Floats:
     return np.where(np.isfinite(model.widths), model.widths, free)
 
 
-def fitted(model: Model, measured_mm: Floats, rows: Bools, start: Floats | None = None, good: Bools | None = None) -> Fit:
+def fitted(
+    model: Model, measured_mm: Floats, rows: Bools, start: Floats | None = None, good: Bools | None = None
+) -> Fit:
     """Return the fit to some rows (n,) of measured points (n, 3).
 
     ``good`` (n,): rows already known to be none too far off; no others are then looked for.
@@ -122,7 +126,10 @@ class _Fitting:
             self._minimise(rows, sigma, "linear")
             sigma = self._noise(rows, sigma)[0]
         sigma, freedom, covariance, slopes = self._noise(rows, sigma)
-        return Fit(self._u * self._steps, sigma, covariance, all_rows & ~rows, slopes, freedom)
+        variance = np.diag(covariance) / self._steps**2
+        told = 1.0 / variance - self._precision
+        by_rows = np.where(told > 1e-3 / variance, self._steps / np.sqrt(np.maximum(told, 1e-300)), np.inf)
+        return Fit(self._u * self._steps, sigma, covariance, by_rows, all_rows & ~rows, slopes, freedom)
 
     def _widen(self, covariance: Floats) -> None:
         """Scale the widths of each group together to what its numbers are (expectation maximisation)."""
@@ -142,7 +149,9 @@ class _Fitting:
         flat = slopes[rows].reshape(-1, slopes.shape[2])
         scaled = flat * self._steps
         normal = scaled.T @ scaled
-        inverse = np.linalg.inv(normal + sigma**2 * np.diag(self._precision) + 1e-9 * np.diag(np.diag(normal)))
+        inverse = np.linalg.inv(
+            normal + sigma**2 * np.diag(self._precision) + 1e-9 * np.diag(np.diag(normal))
+        )
         told = float(np.trace(inverse @ normal))
         freedom = max(len(flat) - told, 1.0)
         left = self.off()[rows]
@@ -164,6 +173,14 @@ class _Fitting:
             return np.concatenate([flat, np.diag(weight)])
 
         found = least_squares(
-            residual, self._u, jac=jacobian, loss=loss, f_scale=1.5, xtol=1e-8, ftol=1e-8, gtol=1e-8, max_nfev=30
+            residual,
+            self._u,
+            jac=jacobian,
+            loss=loss,
+            f_scale=1.5,
+            xtol=1e-8,
+            ftol=1e-8,
+            gtol=1e-8,
+            max_nfev=30,
         )
         self._u = np.asarray(found.x)

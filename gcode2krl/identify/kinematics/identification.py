@@ -1,7 +1,7 @@
-"""The geometry of an arm from its poses: one fit of all small errors, judged on places that it has not seen."""
+"""The geometry of an arm from its poses: one fit of all small errors, judged on places left out of it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
@@ -24,9 +24,11 @@ _LEAST_AGAIN = 8
 _STRANGE = 0.03
 """Off by more of its reach, an arm is not the one that was measured, or its joints are not what they seem."""
 _TOLD = 0.5
-"""A number is told by the poses where they narrow its width to less than this."""
+"""A number is told by the poses where they alone know it to this part of its width, or of 1 mm or 1 mrad."""
 _ALIKE = 0.98
 """Canonical correlation from which two groups are hardly told apart."""
+_OF_CONDITION = ("base", "tool", "zeros", "lengths", "axes", "wrist", "play")
+"""Groups without twins of one another by their form."""
 _LIKE_THE_CONTROLLER_MM = 2e-3
 
 
@@ -41,7 +43,10 @@ class Options:
     by_order: bool = True
     """Without columns of approach, joints came from the row before."""
     gravity_root: tuple[float, float, float] = (0.0, 0.0, -1.0)
-    torque_Nm: Mapping[str, float] = field(default_factory=dict)
+    masses_kg: Sequence[float] | None = None
+    """Of the upper arm, the forearm, and of hand and tool; None: each link's weight is fitted."""
+    only: Container[str] | None = None
+    """Names of the arm's numbers that are fitted; None: all of the groups."""
     folds: int = _FOLDS
     level: float = LEVEL
 
@@ -88,7 +93,7 @@ class Geometry:
     """1-sigma of a coordinate, stated or learnt; None: unknown."""
     noise_from: str
     condition: float
-    """Condition number of the slopes of the told numbers, each in units of its own length."""
+    """Of the slopes of the told numbers of frames and axes, each in units of its own length."""
     alike: tuple[tuple[str, str, float], ...]
     """Groups whose effects are hardly told apart, with their canonical correlation."""
     level: float
@@ -112,12 +117,14 @@ class Geometry:
     def told(self) -> tuple[Part, ...]:
         """The arm's own numbers that the poses tell and whose interval leaves out 0."""
         return tuple(
-            part for part in self.parts if part.group in GEOMETRY and part.is_told and not part.estimate.contains(0.0)
+            part
+            for part in self.parts
+            if part.group in GEOMETRY and part.is_told and not part.estimate.contains(0.0)
         )
 
 
 def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options()) -> Geometry:
-    """Fit frames, zeros, lengths, directions, bending, play, drift and air of an arm to its poses, all at once.
+    """Fit frames, zeros, lengths, axes, bending, play, drift and air of an arm to its poses, all at once.
 
     Parameters
     ----------
@@ -165,7 +172,7 @@ def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options
         condition=_condition(whole, parts),
         alike=tuple(_alike(model, whole)),
         level=options.level,
-        issues=tuple(_issues(readings, whole, good, options)),
+        issues=tuple(_issues(readings, whole, readings.row[index], options)),
         alignment=alignment,
         theta=whole.theta,
         repeatability_mm=_repeatability(poses, index, q_rad),
@@ -199,17 +206,24 @@ def settled(readings: Readings, arm: Arm) -> tuple[Readings, Alignment]:
     if len(tries) > 1 and tries[1][0] < 3.0 * off_mm:
         words = "the joints are in deg or in rad: both fit"
         raise input_error("run-layout", words, "--unit angle=deg|rad", source=readings.source)
-    return replace(readings, q_rad=q, measured=readings.measured * size, angle_unit=unit, length_unit="mm"), found
+    return replace(
+        readings, q_rad=q, measured=readings.measured * size, angle_unit=unit, length_unit="mm"
+    ), found
 
 
 def _strange(readings: Readings, arm: Arm, found: Alignment) -> Issue:
     """Say what does not fit, and which arm would."""
-    words = f"not the poses of {arm.model}: points are {found.off_mm:.0f} mm off (median) with any base and tool"
+    words = (
+        f"not the poses of {arm.model}: points are {found.off_mm:.0f} mm off (median) with any base and tool"
+    )
     if found.is_mirrored:
-        words = f"not the poses of {arm.model}: the points are mirrored, as with a wrong sign of a joint or an axis"
+        words = f"not the poses of {arm.model}: the points are mirrored, as by a joint's wrong sign"
     elif not 0.97 < found.scale < 1.03:
-        words = f"not the poses of {arm.model}: the points are {1.0 / max(found.scale, 1e-9):.3g} times as far apart"
-    return Issue("error", "kinematics-strange", 0, words, f"{_which_fits(readings)}; --unit, --columns, --robot")
+        times = 1.0 / max(found.scale, 1e-9)
+        words = f"not the poses of {arm.model}: the points are {times:.3g} times as far apart"
+    return Issue(
+        "error", "kinematics-strange", 0, words, f"{_which_fits(readings)}; --unit, --columns, --robot"
+    )
 
 
 def _which_fits(readings: Readings) -> str:
@@ -254,11 +268,20 @@ def _poses(readings: Readings, q_rad: Floats, arm: Arm, options: Options) -> tup
 def _model(poses: Poses, arm: Arm, alignment: Alignment, options: Options, groups: Sequence[str]) -> Model:
     base = (alignment.place_mm, alignment.rotation)
     gravity = np.array(options.gravity_root) / np.linalg.norm(options.gravity_root)
-    return model_of(poses, arm.mm, base, alignment.targets_mm, groups=groups, gravity=gravity)
+    return model_of(
+        poses,
+        arm.mm,
+        base,
+        alignment.targets_mm,
+        groups=groups,
+        gravity=gravity,
+        masses_kg=options.masses_kg,
+        only=options.only,
+    )
 
 
 def _places(position_mm: Floats, index: Ints, q_rad: Floats, folds: int) -> Ints:
-    """Return for each row the place (0 to folds - 1) that it belongs to; a pose visited again is one place."""
+    """Return the place (0 to folds - 1) of each row; a pose visited again is one place."""
     same = _same_pose(q_rad)
     middle = np.zeros((len(q_rad), 3))
     first = np.searchsorted(index, np.arange(len(q_rad)))
@@ -285,10 +308,12 @@ def _parts(model: Model, fit: Fit, options: Options, oriented: bool) -> list[Par
     groups = np.array([number.group for number in model.numbers])
     parts = []
     for at, number in enumerate(model.numbers):
-        is_told = bool(deviation[at] < _TOLD * steps[at])
+        is_told = bool(fit.by_rows[at] < _TOLD * steps[at])
         like = () if is_told else tuple(GROUPS[g] for g in _partners(at, shares, groups))
         estimate = around(float(fit.theta[at] * number.size), float(half[at] * number.size))
-        parts.append(Part(number.name, number.group, number.unit, estimate, number.width * number.size, is_told, like))
+        parts.append(
+            Part(number.name, number.group, number.unit, estimate, number.width * number.size, is_told, like)
+        )
     return parts
 
 
@@ -333,6 +358,7 @@ def _alike(model: Model, fit: Fit) -> list[tuple[str, str, float]]:
 
 def _condition(fit: Fit, parts: Sequence[Part]) -> float:
     told = np.array([part.is_told for part in parts])
+    told &= np.array([part.group in _OF_CONDITION for part in parts])
     columns = fit.slopes[:, told]
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     sizes = np.linalg.svd(columns, compute_uv=False)
@@ -342,7 +368,9 @@ def _condition(fit: Fit, parts: Sequence[Part]) -> float:
 # --- noise and doubts -----------------------------------------------------------------------------------
 
 
-def _noise(options: Options, poses: Poses, index: Ints, q_rad: Floats, good: Bools) -> tuple[float | None, str]:
+def _noise(
+    options: Options, poses: Poses, index: Ints, q_rad: Floats, good: Bools
+) -> tuple[float | None, str]:
     """Return the noise of one coordinate and where it is from."""
     if options.noise_mm > 0.0:
         return options.noise_mm, "stated"
@@ -371,7 +399,11 @@ def _rigid(poses: Poses, index: Ints, good: Bools) -> Floats:
     found = [np.zeros(0)]
     for other in range(1, int(poses.target.max(initial=0)) + 1):
         one = {int(i): at for at, i in enumerate(index) if poses.target[at] == 0 and good[at]}
-        pairs = [(one[int(i)], at) for at, i in enumerate(index) if poses.target[at] == other and good[at] and int(i) in one]
+        pairs = [
+            (one[int(i)], at)
+            for at, i in enumerate(index)
+            if poses.target[at] == other and good[at] and int(i) in one
+        ]
         if len(pairs) > 2:
             a, b = np.array(pairs).T
             distance = np.linalg.norm(poses.measured_mm[a] - poses.measured_mm[b], axis=1)
@@ -391,16 +423,30 @@ def _repeatability(poses: Poses, index: Ints, q_rad: Floats) -> float | None:
     return float(np.mean(found)) if found else None
 
 
-def _issues(readings: Readings, fit: Fit, good: Bools, options: Options) -> list[Issue]:
+def _issues(readings: Readings, fit: Fit, rows: Ints, options: Options) -> list[Issue]:
     issues = [Issue("note", "kinematics-rows", 0, note) for note in readings.notes]
     if readings.approach is None and options.by_order and "play" in options.groups:
         words = "play: each joint is taken to have come from the row before"
         remedy = "columns approach_1 to approach_6 of -1, 0, 1, or --no-order"
         issues.append(Issue("note", "kinematics-order", 0, words, remedy))
+    if fit.is_outlier.any():
+        lines = [int(line) for line in rows[fit.is_outlier]]
+        words = f"{len(lines)} of {len(rows)} points are no part of the fit: too far off, rows {_some(lines)}"
+        remedy = "look at them: a beam that was lost, a pose noted wrongly, a reflector that was moved"
+        issues.append(Issue("warning", "kinematics-outlier", lines[0], words, remedy))
     if fit.sigma_mm < _LIKE_THE_CONTROLLER_MM:
-        words = f"the points follow from the joints within {fit.sigma_mm:.1g} mm: is it the controller's own position?"
-        issues.append(Issue("warning", "kinematics-exact", 0, words, "--columns with what an instrument measured"))
+        words = (
+            f"the points follow from the joints within {fit.sigma_mm:.1g} mm: the controller's own position?"
+        )
+        issues.append(
+            Issue("warning", "kinematics-exact", 0, words, "--columns with what an instrument measured")
+        )
     return issues
+
+
+def _some(lines: Sequence[int]) -> str:
+    """Return the first lines in words."""
+    return ", ".join(map(str, lines[:8])) + (" …" if len(lines) > 8 else "")
 
 
 def _distance(model: Model, theta: Floats, measured_mm: Floats) -> Floats:

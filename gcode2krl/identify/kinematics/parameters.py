@@ -1,13 +1,13 @@
 """What may be wrong with an arm: the small numbers of its chain, with the width that makers' tolerances give.
 
 The chain is eq. 1 of `gcode2krl.robot.kinematics` between the frame of the instrument and the tip, with one
-turn or shift for each way in which an axis can miss the next: as many as Denavit and Hartenberg's with Hayati's
-turn for the parallel A2 and A3 (Hayati and Mirmirani 1985). Where an axis is tilted, the line of the turn is that of
-the effect ``axis_parallelism``. Numbers that no poses can tell apart (zero of A1 and turn of the base) are all
-there; their widths share them out, and what is not told apart is said.
+turn or shift for each way in which an axis can miss the next: as many as Denavit and Hartenberg's with
+Hayati's turn for the parallel A2 and A3 (Hayati and Mirmirani 1985). Where an axis is tilted, the line of the
+turn is that of the effect ``axis_parallelism``. Numbers that no poses can tell apart (zero of A1 and turn of
+the base) are all there; their widths share them out, and what is not told apart is said.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,7 +36,7 @@ GEOMETRY = ("zeros", "lengths", "axes", "wrist", "weight", "play", "gears")
 _SIGNS = (-1.0, 1.0, 1.0, -1.0, 1.0, -1.0)
 _JOINTS = range(1, 7)
 _ZERO_RAD = 0.1 * RAD_PER_DEG
-"""A zero set with the maker's gauge is within some 0.02 deg, one set at a mark within some 0.1 (mastering)."""
+"""A zero set with the maker's gauge is within some 0.02 deg, one set at a mark within some 0.1."""
 _LENGTH_MM = 0.5
 """Castings and their machining 0.1-0.5 mm; uncalibrated absolute accuracy of large arms 1-3 mm."""
 _AXIS_RAD = 0.5e-3
@@ -56,7 +56,7 @@ _DRIFT_MM, _DRIFT_RAD = 0.1, 0.02e-3
 _SCALE = 20e-6
 """1e-6/K of the air's refraction, 12e-6/K of a steel scale; some kelvins."""
 _BEND_PER_MM = 1.5e-9
-"""Half of 1e-6/K·3 K/m, in 1/mm: distance² times it is by how far a beam sinks (as in `tracker_refraction`)."""
+"""Half of 1e-6/K·3 K/m, in 1/mm: a beam sinks by it times distance² (as in `tracker_refraction`)."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """What is known of each row: a tip on a pose, several rows a pose where the tool bears several targets."""
+    """What is known of each row: one target on one pose."""
 
     q_rad: Floats
     """(n, 6) KUKA's signs and zero."""
@@ -94,9 +94,10 @@ class Poses:
 
 @dataclass(eq=False)
 class Model:
-    """The chain of all rows and its small numbers; ``extra`` (n, 3, p) are what moves the measured point itself."""
+    """The chain of all rows and its small numbers; ``extras`` move the measured points themselves."""
 
     chain: Chain
+    only: Container[str] | None = None
     numbers: list[Number] = field(default_factory=list)
     extras: list[tuple[int, Floats]] = field(default_factory=list)
 
@@ -111,6 +112,8 @@ class Model:
         extra: Floats | None = None,
     ) -> None:
         """Add a number that changes some motions of the chain, or moves the measured points (n, 3)."""
+        if self.only is not None and group in GEOMETRY and name not in self.only:
+            return
         number = len(self.numbers)
         shown, size = {
             "mm": ("mm", 1.0),
@@ -147,14 +150,14 @@ class Model:
 
 
 def nominal_chain(q_rad: Floats, mm: Floats) -> Chain:
-    """Return the chain of an arm without errors: base, A1 to A6, tool (n rows, KUKA's joints, lengths (7,))."""
+    """Return the chain of an arm without errors, of n rows in KUKA's joints and lengths (7,)."""
     a1, a2, b, c1, c2, c3, c4 = mm
     chain = Chain(len(q_rad))
     for axis, letter in enumerate("xyz"):
         chain.shift(f"base {letter}", axis)
     for axis, letter in ((2, "z"), (1, "y"), (0, "x")):
         chain.turn(f"base turn {letter}", axis)
-    turns = _SIGNS * q_rad
+    turns = np.array(_SIGNS) * q_rad
     chain.turn("A1", 2, turns[:, 0])
     chain.shift("a1", 0, a1)
     chain.shift("c1", 2, c1)
@@ -196,43 +199,40 @@ def model_of(
     tools_mm: Floats,
     *,
     groups: Sequence[str] = tuple(GROUPS),
-    base_known: bool = False,
-    tool_known: bool = False,
     gravity: Floats | None = None,
-    torque_Nm: Floats | None = None,
+    masses_kg: Sequence[float] | None = None,
+    only: Container[str] | None = None,
 ) -> Model:
     """Return the chain of poses with all its small numbers.
 
     Parameters
     ----------
     mm : (7,) lengths of the arm.
-    base : place (3,) in mm and rotation (3, 3) of the robot's root in the instrument's frame, about which is fitted.
+    base : place (3,) in mm and rotation (3, 3) of the root in the instrument's frame, about which is fitted.
     tools_mm : (t, 3) targets in the flange, about which is fitted.
     groups : keys of `GROUPS` that are fitted; base and tool always are.
-    base_known, tool_known : as well as a length is, instead of not at all.
     gravity : (3,) direction of gravity in the robot's root; down by default.
-    torque_Nm : (n, 6) of gravity on each joint, positive with the turn of `nominal_chain`, where masses are
-        stated; without it each link's weight is a number of its own.
+    masses_kg : of upper arm, forearm, and hand with tool; None: each link's weight is a number of its own.
+    only : names of the arm's numbers that are fitted; None: all of the groups.
     """
     chain = nominal_chain(poses.q_rad, mm)
     _place(chain, base, tools_mm[poses.target])
-    model = Model(chain)
+    model = Model(chain, only)
     for letter in "xyz":
-        model.add(f"base {letter}", "base", _LENGTH_MM if base_known else FREE, [(f"base {letter}", 1.0)], unit="mm")
+        model.add(f"base {letter}", "base", FREE, [(f"base {letter}", 1.0)], unit="mm")
     for letter in "xyz":
-        width = _AXIS_RAD if base_known else FREE
-        model.add(f"base turn {letter}", "base", width, [(f"base turn {letter}", 1.0)], unit="deg")
+        model.add(f"base turn {letter}", "base", FREE, [(f"base turn {letter}", 1.0)], unit="deg")
     for target in range(len(tools_mm)):
         which = f" {target + 1}" if len(tools_mm) > 1 else ""
         is_own = (poses.target == target).astype(float)
         for letter in "xyz":
-            width = _LENGTH_MM if tool_known else FREE
-            model.add(f"tool{which} {letter}", "tool", width, [(f"tool {letter}", is_own)], unit="mm")
+            model.add(f"tool{which} {letter}", "tool", FREE, [(f"tool {letter}", is_own)], unit="mm")
     for group, maker in _MAKERS.items():
         if group in groups:
             maker(model, poses)
     if "weight" in groups:
-        _add_weight(model, poses, np.array([0.0, 0.0, -1.0]) if gravity is None else gravity, torque_Nm, base)
+        upright = np.array([0.0, 0.0, -1.0])
+        _add_weight(model, poses, base[1] @ (upright if gravity is None else gravity), masses_kg)
     return model
 
 
@@ -243,7 +243,11 @@ def _place(chain: Chain, base: tuple[Floats, Floats], tip_mm: Floats) -> None:
         chain.motions[f"base {letter}"].nominal = np.full(chain.rows, place[axis])
         chain.motions[f"tool {letter}"].nominal = tip_mm[:, axis]
     beta = np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0))
-    turns = {"z": np.arctan2(rotation[1, 0], rotation[0, 0]), "y": beta, "x": np.arctan2(rotation[2, 1], rotation[2, 2])}
+    turns = {
+        "z": np.arctan2(rotation[1, 0], rotation[0, 0]),
+        "y": beta,
+        "x": np.arctan2(rotation[2, 1], rotation[2, 2]),
+    }
     for letter, angle in turns.items():
         chain.motions[f"base turn {letter}"].nominal = np.full(chain.rows, angle)
 
@@ -300,11 +304,13 @@ def _add_drift(model: Model, poses: Poses) -> None:
         for power, course in courses.items():
             model.add(f"drift {letter}{power}", "drift", _DRIFT_MM, [(f"base {letter}", course)], unit="mm")
     for letter in "xyz":
-        model.add(f"drift turn {letter}", "drift", _DRIFT_RAD, [(f"base turn {letter}", poses.time)], unit="mrad")
+        model.add(
+            f"drift turn {letter}", "drift", _DRIFT_RAD, [(f"base turn {letter}", poses.time)], unit="mrad"
+        )
 
 
 def _add_air(model: Model, poses: Poses) -> None:
-    """Scale, and a beam that sinks with the square of the distance from an instrument that stands anywhere."""
+    """Add scale, and a beam that sinks with distance² from an instrument that stands anywhere."""
     middle = poses.measured_mm - poses.measured_mm.mean(axis=0)
     model.add("scale", "air", _SCALE, unit="ppm", extra=middle)
     up = model.chain.walk(np.zeros(len(model.numbers)))[2]["A1"][0]
@@ -327,38 +333,37 @@ _MAKERS = {
 }
 _LUMPS = {"upper arm": ("A2", "A3", 0.5), "forearm": ("A3", "A5", 0.5), "wrist and tool": ("A5", "tip", 1.0)}
 """Where a link's weight is thought to be: this part of the way from one place to another."""
-_BORNE = {"A1": ("upper arm", "forearm", "wrist and tool"), "A2": ("upper arm", "forearm", "wrist and tool"),
-          "A3": ("forearm", "wrist and tool"), "A4": ("wrist and tool",), "A5": ("wrist and tool",)}  # fmt: skip
+_BORNE = {
+    "A1": ("upper arm", "forearm", "wrist and tool"),
+    "A2": ("upper arm", "forearm", "wrist and tool"),
+    "A3": ("forearm", "wrist and tool"),
+    "A4": ("wrist and tool",),
+    "A5": ("wrist and tool",),
+}
 
 
-def _add_weight(
-    model: Model,
-    poses: Poses,
-    gravity: Floats,
-    torque_Nm: Floats | None,
-    base: tuple[Floats, Floats],
-) -> None:
-    """Add the joints' turns under gravity: torque over stiffness, or each link's weight on the joints that bear it.
+def _add_weight(model: Model, poses: Poses, down: Floats, masses_kg: Sequence[float] | None) -> None:
+    """Add the joints' turns under gravity, along ``down`` (3,) in the instrument's frame.
 
-    Without masses a number is the turn with the link's lever at its longest.
+    With masses each joint has its stiffness: a number is its turn under the largest torque of all poses.
+    Without them each link's weight on each joint is a number: the turn with the link's lever at its longest.
     """
-    if torque_Nm is not None:
-        for joint in range(1, 6):
-            slope = torque_Nm[:, joint - 1]
-            most = float(np.abs(slope).max(initial=0.0))
-            if most > 1e-6:
-                terms: list[tuple[str, Floats | float]] = [(f"A{joint}", slope / most)]
-                model.add(f"A{joint} under weight", "weight", 2.0 * _SAG_RAD, terms, unit="mrad")
-        return
     tip, _, acts = model.chain.walk(np.zeros(len(model.numbers)))
     places = {**{name: place for name, (_, place) in acts.items()}, "tip": tip}
-    down = base[1] @ gravity
     for joint, borne in _BORNE.items():
         axis, place = acts[joint]
+        slopes, longest = {}, 1.0
         for lump in borne:
             start, end, share = _LUMPS[lump]
             lever = places[start] + share * (places[end] - places[start]) - place
-            slope = np.sum(np.cross(axis, lever) * down, axis=1)
-            longest = float(np.linalg.norm(lever, axis=1).max(initial=0.0))
-            if longest > 1.0 and float(np.abs(slope).max()) > 1e-6 * longest:
-                model.add(f"{joint} under {lump}", "weight", _SAG_RAD, [(joint, slope / longest)], unit="mrad")
+            slopes[lump] = np.sum(np.cross(axis, lever) * down, axis=1)
+            longest = max(longest, float(np.linalg.norm(lever, axis=1).max(initial=0.0)))
+        if masses_kg is not None:
+            slopes = {
+                "weight": sum(masses_kg[list(_LUMPS).index(lump)] * slope for lump, slope in slopes.items())
+            }
+        for lump, slope in slopes.items():
+            most = float(np.abs(slope).max(initial=0.0))
+            if most > 1e-6 * longest:
+                size = most if masses_kg is not None else longest
+                model.add(f"{joint} under {lump}", "weight", _SAG_RAD, [(joint, slope / size)], unit="mrad")

@@ -20,7 +20,9 @@ _AROUND_MM = 100.0
 """A measured orientation is read as three points so far from the tip."""
 _BEYOND_RAD, _BEYOND_M = 10.0, 20.0
 """No joint turns by more, no instrument of a robot sees further: as in `runs.foreign.guess`."""
-_TARGET = re.compile(r"(?:(?:target|reflector|smr|point|ball|p)_?)?(?:([xyz])_?([1-9])|([1-9])_?([xyz]))(?:_(mm|m))?")
+_TARGET = re.compile(
+    r"(?:(?:target|reflector|smr|point|ball|p)_?)?(?:([xyz])_?([1-9])|([1-9])_?([xyz]))(?:_(mm|m))?"
+)
 _APPROACH = re.compile(r"(?:approach|direction|dir)_?[aqj]?([1-6])")
 
 
@@ -54,7 +56,7 @@ class Readings:
 def read_readings(
     source: Any, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None
 ) -> Readings:
-    """Read poses: q1 to q6 (or A1, J1, joint_1 …), x, y, z; optionally a, b, c, approach_1 …, t, x2, y2, z2 ….
+    """Read poses: q1 to q6 (A1, J1 …), x, y, z; optionally a, b, c, approach_1 …, t, x2, y2, z2 ….
 
     Parameters
     ----------
@@ -73,7 +75,9 @@ def read_readings(
     for kind in stated:
         if kind not in ("angle", "length") or unit_of(stated[kind]) not in FACTORS[kind]:
             words = f"--unit {kind}={stated[kind]}: not understood"
-            raise input_error("run-layout", words, "--unit angle=deg|rad, --unit length=mm|m", source=table.source)
+            raise input_error(
+                "run-layout", words, "--unit angle=deg|rad, --unit length=mm|m", source=table.source
+            )
     q, angle_unit = _joints(table, named, stated.get("angle", ""))
     targets, length_unit = _seen(table, named, stated.get("length", ""))
     row = np.arange(len(q), dtype=np.int64) + table.first_row
@@ -85,7 +89,9 @@ def read_readings(
     targets, oriented = _with_orientation(table, named, targets, length_unit)
     if int(kept.sum()) < _LEAST:
         words = f"{int(kept.sum())} poses with joints and a measured point, at least {_LEAST} are needed"
-        raise input_error("table-empty", words, "30 poses and more, over the whole work space", source=table.source)
+        raise input_error(
+            "table-empty", words, "30 poses and more, over the whole work space", source=table.source
+        )
     approach = _approach(table, named)
     time = table.columns[named["t"]] if "t" in named else None
     return Readings(
@@ -152,7 +158,11 @@ def _joints(table: Table, named: Mapping[str, str], stated: str) -> tuple[Floats
 def _unit(table: Table, names: Sequence[str], stated: str, kind: str) -> str:
     """Return the unit that a person, a line of units or a name states; "" where none does."""
     by_name = [meaning.unit for meaning in meanings(names).values()]
-    units = {unit_of(stated)} if stated else {table.units.get(name, "") or unit for name, unit in zip(names, by_name, strict=True)}
+    units = (
+        {unit_of(stated)}
+        if stated
+        else {table.units.get(name, "") or unit for name, unit in zip(names, by_name, strict=True)}
+    )
     known = {unit for unit in units if unit in FACTORS[kind]}
     return known.pop() if len(known) == 1 else ""
 
@@ -179,7 +189,9 @@ def _with_orientation(
     if targets.shape[1] > 1 or length_unit == "":
         return targets, False
     if all(name in named for name in ("qx", "qy", "qz", "qw")):
-        rotation = rotation_from_quaternion(np.stack([table.columns[named[q]] for q in ("qx", "qy", "qz", "qw")], axis=1))
+        rotation = rotation_from_quaternion(
+            np.stack([table.columns[named[q]] for q in ("qx", "qy", "qz", "qw")], axis=1)
+        )
     elif all(name in named for name in "abc"):
         names = [named[letter] for letter in "abc"]
         values = np.stack([table.columns[name] for name in names], axis=1)
