@@ -6,8 +6,6 @@ Errors are root mean squares over places left out of the fit, in mm; "oracle" is
 sqrt(3) sigma. The peer is what a person writes with scipy: least squares on the 24 Denavit-Hartenberg numbers
 with base and tool, in as many lines as `_peer` has. ``--draws`` arms of each kind and maker, ``--poses`` of
 each.
-
-``--abb FOLDER``: a copy of icelinker/Robot-Calibration-LaserTracker on GitHub instead, see docs/real_data.md.
 """
 
 import argparse
@@ -25,14 +23,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from gcode2krl.identify.kinematics import (
     Geometry,
-    Options,
     arm_named,
     identify_kinematics,
     read_readings,
 )
 from tests.plant import pose_arms
 
-AIMS = {"clean": 0.04, "ratio": 1.2, "coverage": (0.87, 0.93), "seconds": 10.0, "abb": 0.50}
+AIMS = {"clean": 0.04, "ratio": 1.2, "coverage": (0.87, 0.93), "seconds": 10.0}
 
 
 def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] = print) -> int:
@@ -40,10 +37,7 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=3)
     parser.add_argument("--poses", type=int, default=400)
-    parser.add_argument("--abb", type=Path, metavar="FOLDER")
     given = parser.parse_args(arguments)
-    if given.abb is not None:
-        return 0 if real(given.abb, write) else 1
     met = [*(figures(kind, given.draws, given.poses, write) for kind in ("clean", "hard"))]
     return 0 if all([*met, timed(write)]) else 1
 
@@ -128,25 +122,6 @@ def _peer_tips(rows: np.ndarray, theta: np.ndarray, x: np.ndarray) -> np.ndarray
         turn = turn @ pose_arms.elementary("turn", axis, np.array([angle]))[0]
     tip = pose_arms.frames(changed, theta)[6] @ np.array([*x[6:9], 1.0])
     return tip[:, :3] @ turn[:3, :3].T + x[:3]
-
-
-def real(folder: Path, write: Callable[[str], object]) -> bool:
-    """Print the figures of the ABB IRB 120 by groups of numbers; True where the aim is met."""
-    readings = read_readings(abb_columns(folder))
-    groups: tuple[str, ...] = ()
-    for more in (("zeros", "lengths", "axes"), ("play",), ("weight",), ("wrist", "gears"), ("drift", "air")):
-        groups += more
-        found = identify_kinematics(readings, arm_named("ABB IRB 120-3/0.6"), Options(groups=groups))
-        before, after = (np.sqrt(np.mean(values**2)) for values in (found.before_mm, found.after_mm))
-        write(f"  + {', '.join(more):<22} {before:.3f} -> {after:.3f} mm, all {len(found.row)} points")
-    return after <= AIMS["abb"]
-
-
-def abb_columns(folder: Path) -> dict[str, np.ndarray]:
-    """Return joints in deg and the first reflector in mm of icelinker/Robot-Calibration-LaserTracker."""
-    place = folder / "4-DataProcess" / "Output"
-    q, seen = (np.loadtxt(place / f"processed_{name}.txt") for name in ("joints", "SMR_1"))
-    return {f"q{j + 1}_deg": q[:, j] for j in range(6)} | {f"{a}_mm": seen[:, i] for i, a in enumerate("xyz")}
 
 
 if __name__ == "__main__":

@@ -150,7 +150,7 @@ def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options
     after = np.empty(len(index))
     for place in range(options.folds):
         out = places == place
-        if out.any():
+        if out.any() and (good & ~out).any():
             part = fitted(model, poses.measured_mm, ~out, start=whole.theta, good=good)
             after[out] = _distance(model, part.theta, poses.measured_mm)[out]
     noise_mm, noise_from = _noise(options, poses, index, q_rad, good)
