@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
@@ -76,11 +75,12 @@ def command(
     output: str | None,
     plot: str | None,
 ) -> int:
-    """Fit an arm's own errors to measured poses, all at once, and judge them on places left out of the fit.
+    """Fit frames, zeros, lengths, axes, bending and play of an arm to measured poses.
 
-    POSES is a table (CSV, Parquet, MATLAB v5) of joint angles and the point that an instrument saw: q1 to
-    q6, x, y, z under any usual name; optionally a, b, c, further targets x2, y2, z2 …, approach_1 to
-    approach_6 (-1, 0, 1) and t. Base, tool and the instrument's frame need not be known.
+    All are fitted at once, and judged on places left out of the fit. POSES is a table (CSV, Parquet, MATLAB
+    v5) of joint angles and the point that an instrument saw: q1 to q6, x, y, z under any usual name;
+    optionally a, b, c, further targets x2, y2, z2 …, approach_1 to approach_6 (-1, 0, 1) and t. Base, tool
+    and the instrument's frame need not be known.
     """
     console = Console(quiet, as_json)
     try:
@@ -128,7 +128,7 @@ def _asked(
     for group in without:
         if group not in fitted:
             raise input_error("option-value", f"--without {group!r}: no group", f"one of {', '.join(fitted)}")
-    if not np.linalg.norm(gravity) > 0.0:
+    if not any(gravity):
         raise input_error(
             "option-value", "gravity: a direction of length 0", "0 0 -1 for a robot on the floor"
         )
@@ -158,6 +158,8 @@ def _pairs(words: Sequence[str], option: str) -> dict[str, str]:
 
 
 def _say(result: "Geometry", console: Console) -> None:
+    import numpy as np
+
     count, outliers = len(result.row), int(result.is_outlier.sum())
     console.say(
         f"{result.source}: {result.robot}, {count} points; {len(result.told)} small numbers of the arm: "
@@ -233,6 +235,8 @@ _KEYS = (
 
 
 def _record(result: "Geometry") -> dict[str, Any]:
+    import numpy as np
+
     from gcode2krl.frames import abc_from_rotation
 
     numbers = {
@@ -305,6 +309,7 @@ def _section(readings: "Readings", arm: "Arm", options: "Options", file: Path) -
 
 
 def _figure(result: "Geometry", file: Path) -> Path:
+    import numpy as np
     from matplotlib.figure import Figure
 
     from gcode2krl.files import write_together
