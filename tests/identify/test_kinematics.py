@@ -109,10 +109,11 @@ def test_seventeen_small_errors_of_a_clean_arm():
     assert "instrument's frame" in by_name["A1 zero"].like
 
 
-@pytest.mark.parametrize("arm", pose_arms.MAKERS, ids=lambda arm: arm.name)
-def test_arms_of_six_makers_with_all_that_goes_wrong(arm):
+@pytest.mark.parametrize("arm", pose_arms.MAKERS[::2], ids=lambda arm: arm.name)
+def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
+    """The benchmark has all six makers."""
     made = pose_arms.hard(arm, 2)
-    table, found = identified(made, 400, again=20)
+    table, found = identified(made, 300, again=16)
     assert off_by_noise(found, made) < 1.2
     assert (found.is_outlier == table.is_wrong).all()
     assert found.noise_mm == pytest.approx(made.noise_mm, rel=0.25)
@@ -122,9 +123,9 @@ def test_arms_of_six_makers_with_all_that_goes_wrong(arm):
 def test_intervals_hold_the_truth_nine_times_in_ten():
     """Slow drift of the figure would be seen by benchmarks/identify_kinematics.py, which draws more."""
     inside = []
-    for seed in range(6):
+    for seed in range(4):
         arm = pose_arms.clean(pose_arms.MAKERS[seed], seed + 50)
-        _, found = identified(arm, 250, seed)
+        _, found = identified(arm, 150, seed)
         by_name = {part.name: part.estimate for part in found.parts}
         inside += [by_name[name].contains(value) for name, value in pose_arms.truth(arm).items()]
     assert 0.8 < np.mean(inside) < 0.98
