@@ -10,12 +10,13 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.gap.beside.arm_geometry import arm_geometry
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import PART, PATH, SERVO, SIGNALS, TIMING, Link
+from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.beside.retiming import on_own_timing
@@ -24,6 +25,7 @@ from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
+from gcode2krl.gap.tell.geometry_cause import with_geometry
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
@@ -103,6 +105,19 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 
 
 def _diagnosed(context: Context, begin: Begin) -> Gap:
+    """Return the answer; of poses that the arm's own geometry explains, also what is at work beside it."""
+    gap = _answered(context, begin)
+    if any(cause.words is not None for cause in gap.named_causes):
+        return gap
+    links = (link for link in gap.links if link.link == MECHANICS.name and link.rms_before > 0.0)
+    left = next((link.rms_after / link.rms_before for link in links), 1.0)
+    found = arm_geometry(context.pairs, context.explaining, left)
+    if found is None:
+        return gap
+    return with_geometry(gap, _answered(context.with_pairs(found.pairs), begin), found)
+
+
+def _answered(context: Context, begin: Begin) -> Gap:
     """Return the answer: slips first, then each link on what earlier ones have shown, then the verdict."""
     begin("slips of the set-up")
     set_up = examine_set_up(context)

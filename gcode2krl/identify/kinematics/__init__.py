@@ -6,10 +6,13 @@ from gcode2krl.identify.kinematics.identification import (
     Options,
     Part,
     identify_kinematics,
+    tips_of,
 )
+from gcode2krl.identify.kinematics.parameters import GEOMETRY
 from gcode2krl.identify.kinematics.readings import Readings, read_readings
 
 __all__ = [
+    "GEOMETRY",
     "Arm",
     "Geometry",
     "Options",
@@ -20,4 +23,5 @@ __all__ = [
     "arm_of",
     "identify_kinematics",
     "read_readings",
+    "tips_of",
 ]

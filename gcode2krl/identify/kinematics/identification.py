@@ -179,6 +179,14 @@ def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options
     )
 
 
+def tips_of(found: Geometry, readings: Readings, arm: Arm, options: Options) -> Floats:
+    """Return where the instrument should see the tips (n, 3) of other poses of an arm, in rad and mm."""
+    poses, _ = _poses(readings, arm.kuka_rad(readings.q_rad), arm, options)
+    model = _model(poses, arm, found.alignment, options, tuple(options.groups))
+    values = {part.name: part.estimate.value for part in found.parts}
+    return model.tips(np.array([values.get(number.name, 0.0) / number.size for number in model.numbers]))
+
+
 # --- units, frames, rows --------------------------------------------------------------------------------
 
 
