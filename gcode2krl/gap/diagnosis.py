@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
@@ -26,6 +24,7 @@ from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.geometry_cause import with_geometry
+from gcode2krl.gap.tell.lateness import lateness, with_lateness
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
@@ -127,6 +126,11 @@ def _answered(context: Context, begin: Begin) -> Gap:
     context = with_controller_clocks(context, PATH)
     on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
     issues = [*issues, *_of_actual_joints(context, on_time)]
+    late = [
+        lateness(planned, timed)
+        for planned, timed in zip(context.pairs, on_time.pairs, strict=True)
+        if planned.has_actual_joints_alone
+    ]
     context = _with_data(on_time)
     rough = _rough(context)
     links = begin("links")
@@ -142,7 +146,7 @@ def _answered(context: Context, begin: Begin) -> Gap:
     surface = judge_surface(PART, context)
     if surface is not None:
         context = context.with_judgement(surface)
-    return answer(context, slips, issues)
+    return with_lateness(answer(context, slips, issues), late)
 
 
 def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
@@ -153,8 +157,8 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
         return []
     late = []
     for pair, timed in pairs:
-        moved_s = timed.inputs.time_s - pair.inputs.time_s
-        if (largest_s := float(np.ptp(moved_s))) > 0.0:
+        largest_s = lateness(pair, timed).largest_s
+        if largest_s > 0.0:
             words = (
                 f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
             )
