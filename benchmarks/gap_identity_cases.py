@@ -5,7 +5,6 @@ of no library, pairs, effects taken out of the library, logs without a predictio
 or force sensor. A case has one to three runs and, in turn, one held out.
 """
 
-import importlib.util
 import json
 import shutil
 import sys
@@ -159,15 +158,10 @@ def _prediction(run: Path) -> str:
 
 
 def _example(folder: Path) -> list[Job]:
-    """Return the example of the documents, as JSON and as text."""
-    spec = importlib.util.spec_from_file_location("diagnose_example", ROOT / "docs" / "diagnose_example.py")
-    assert spec is not None
-    assert spec.loader is not None
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
+    """Return a case with play in axis 3, as JSON and as text."""
     place = folder / "cases" / "example"
     if not place.exists():
-        make_case(example.SEED, place, example.EFFECT, "same", predictions="../../../predictions")
+        make_case(1032, place, "backlash@A3", "same", predictions="../../../predictions")
         place.with_name("example.label.json").unlink()
     runs = sorted(f"cases/example/{run.name}" for run in place.glob("run-*"))
     named = f"predictions/{next(iter(PROGRAMS))}"

@@ -4,12 +4,15 @@
 (MIT): three logs of a KUKA KR 300 R2500 ultra. Its files become run folders, which are diagnosed from the log
 alone; what is measured is printed beside what was expected. ``--runs DIR`` keeps the run folders. Without
 FOLDER the same is done with made-up logs, to try the program; they are not judged.
+
+``--abb FOLDER``: a copy of icelinker/Robot-Calibration-LaserTracker (it states no licence: read, never
+passed on), whose poses are fitted.
 """
 
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +24,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.operators import play
 from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.tell.result import Gap
+from gcode2krl.identify.kinematics import arm_named, identify_kinematics, read_readings
 from gcode2krl.runs import load_run
 
 LOAD_ENCODERS = 3
@@ -155,6 +159,29 @@ def carried_over(logs: Sequence[Log], joint: int, late_s: float) -> list[float]:
     return found
 
 
+# Poses of an arm
+
+
+ABB_BEFORE_MM, ABB_AFTER_MM = (0.82, 0.92), 0.50
+
+
+def read_abb(folder: Path) -> dict[str, Floats]:
+    """Return joints in deg and the first reflector in mm of a copy of the repository, by column."""
+    place = folder / "4-DataProcess" / "Output"
+    q, seen = (np.loadtxt(place / f"processed_{name}.txt") for name in ("joints", "SMR_1"))
+    return {f"q{j + 1}_deg": q[:, j] for j in range(6)} | {f"{a}_mm": seen[:, i] for i, a in enumerate("xyz")}
+
+
+def abb_rows(columns: Mapping[str, Floats]) -> Iterator["Row"]:
+    """Yield the lines of the table for the poses; all points are counted."""
+    found = identify_kinematics(read_readings(columns), arm_named("ABB IRB 120-3/0.6"))
+    before, after = (float(np.sqrt(np.mean(values**2))) for values in (found.before_mm, found.after_mm))
+    low, high = ABB_BEFORE_MM
+    yield Row("IRB 120, frame and tool", f"{low} to {high} mm", f"{before:.3f} mm", low <= before <= high)
+    agrees = after <= ABB_AFTER_MM
+    yield Row("IRB 120, places left out", f"{ABB_AFTER_MM} mm or less", f"{after:.3f} mm", agrees)
+
+
 # What is printed
 
 
@@ -269,16 +296,25 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
     parser.add_argument(
         "--runs", type=Path, help="folder for the runs that are written; by default they are removed"
     )
+    parser.add_argument("--abb", type=Path, metavar="FOLDER", help="a copy of the poses of an ABB IRB 120")
     given = parser.parse_args(arguments)
+    if given.abb is not None:
+        return 0 if all(_printed(abb_rows(read_abb(given.abb)), write)) else 1
     logs = read_logs(given.folder) if given.folder else made_up_logs()
     with tempfile.TemporaryDirectory() as scratch:
-        found = []
-        for row in rows(logs, given.runs or Path(scratch)):
-            found.append(row.agrees)
-            write(f"{'as expected' if row.agrees else 'NOT AS EXPECTED':16}{row.what}")
-            write(f"{'':16}expected: {row.expected}")
-            write(f"{'':16}measured: {row.measured}")
+        found = _printed(rows(logs, given.runs or Path(scratch)), write)
     return 0 if all(found) or given.folder is None else 1
+
+
+def _printed(table: Iterable[Row], write: Callable[[str], object]) -> list[bool]:
+    """Print the lines of a table; return which agree."""
+    found = []
+    for row in table:
+        found.append(row.agrees)
+        write(f"{'as expected' if row.agrees else 'NOT AS EXPECTED':16}{row.what}")
+        write(f"{'':16}expected: {row.expected}")
+        write(f"{'':16}measured: {row.measured}")
+    return found
 
 
 if __name__ == "__main__":

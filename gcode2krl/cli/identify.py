@@ -9,6 +9,7 @@ _WHAT = {
     "controller": "Fit how the controller plans to a recorded trace: k, effective CDIS, the law.",
     "stiffness": "Fit the stiffness of the robot's joints and links to distances of measuring cubes.",
     "sensor": "Fit weight, centre of gravity and offsets to readings of the unloaded force sensor.",
+    "kinematics": "Fit frames, zeros, lengths, axes, bending and play of an arm to measured poses.",
     "force": "Fit the six coefficients of the linear edge law to the measured force of a run.",
 }
 
@@ -23,4 +24,4 @@ _WHAT = {
     module="gcode2krl.cli.identify_{}",
 )
 def command() -> None:
-    """Fit the cell to measurements: controller, stiffness, sensor, cutting force."""
+    """Fit the cell to measurements: controller, stiffness, sensor, kinematics, cutting force."""

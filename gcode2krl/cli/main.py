@@ -31,7 +31,7 @@ _COMMANDS = {
     "diagnose": "Say where measured runs differ from their prediction, which effects explain it, "
     "and how far it shrinks.",
     "runs": "Measured runs: make one of a log.",
-    "identify": "Fit the cell to measurements: controller, stiffness, sensor, cutting force.",
+    "identify": "Fit the cell to measurements: controller, stiffness, sensor, kinematics, cutting force.",
     "online": "Compensate online: the twin, the RSI server, replay.",
     "stiffness-map": "Draw how far the robot bends under a load: over $BASE's plane, over the spin, "
     "and joint by joint.",

@@ -4,18 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
+from gcode2krl.gap.beside.arm_geometry import arm_geometry
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import PART, PATH, SERVO, SIGNALS, TIMING, Link
+from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.beside.retiming import on_own_timing
@@ -24,6 +23,8 @@ from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
+from gcode2krl.gap.tell.geometry_cause import with_geometry
+from gcode2krl.gap.tell.lateness import lateness, with_lateness
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
@@ -103,6 +104,19 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 
 
 def _diagnosed(context: Context, begin: Begin) -> Gap:
+    """Return the answer; of poses that the arm's own geometry explains, also what is at work beside it."""
+    gap = _answered(context, begin)
+    if any(cause.words is not None for cause in gap.named_causes):
+        return gap
+    links = (link for link in gap.links if link.link == MECHANICS.name and link.rms_before > 0.0)
+    left = next((link.rms_after / link.rms_before for link in links), 1.0)
+    found = arm_geometry(context.pairs, context.explaining, left)
+    if found is None:
+        return gap
+    return with_geometry(gap, _answered(context.with_pairs(found.pairs), begin), found)
+
+
+def _answered(context: Context, begin: Begin) -> Gap:
     """Return the answer: slips first, then each link on what earlier ones have shown, then the verdict."""
     begin("slips of the set-up")
     set_up = examine_set_up(context)
@@ -112,6 +126,11 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     context = with_controller_clocks(context, PATH)
     on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
     issues = [*issues, *_of_actual_joints(context, on_time)]
+    late = [
+        lateness(planned, timed)
+        for planned, timed in zip(context.pairs, on_time.pairs, strict=True)
+        if planned.has_actual_joints_alone
+    ]
     context = _with_data(on_time)
     rough = _rough(context)
     links = begin("links")
@@ -127,7 +146,7 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     surface = judge_surface(PART, context)
     if surface is not None:
         context = context.with_judgement(surface)
-    return answer(context, slips, issues)
+    return with_lateness(answer(context, slips, issues), late)
 
 
 def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
@@ -138,8 +157,8 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
         return []
     late = []
     for pair, timed in pairs:
-        moved_s = timed.inputs.time_s - pair.inputs.time_s
-        if (largest_s := float(np.ptp(moved_s))) > 0.0:
+        largest_s = lateness(pair, timed).largest_s
+        if largest_s > 0.0:
             words = (
                 f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"
             )

@@ -7,6 +7,7 @@ import pytest
 
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gap import diagnose
+from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.runs.foreign import run_or_log
 from tests.gap.synthetic import applied, prediction, runs, write_log
 
@@ -37,6 +38,22 @@ def test_an_override_is_a_slip_and_the_lateness_is_told():
     gap = diagnose(prediction(), logs(change=lambda table: replace(table, time_s=table.time_s / 0.9)))
     assert [(slip.effect, slip.target) for slip in gap.causes] == [("override", None)]
     assert codes(gap).count("joints-actual-alone") == 2
+
+
+def test_a_run_that_is_late_for_a_while_is_a_gap_of_timing():
+    """Its joints are right place by place, but nobody may read first that there is no gap."""
+
+    def late_in_the_middle(table):
+        share = (table.time_s - table.time_s[0]) / np.ptp(table.time_s)
+        return replace(table, time_s=table.time_s + 0.3 * np.sin(np.pi * share) ** 2)
+
+    gap = diagnose(prediction(), logs(change=late_in_the_middle))
+    assert gap.verdict == "unexplained"
+    assert headline(gap).startswith("The robot is ")
+    assert "early or late on its path" in headline(gap)
+    (timing,) = [link for link in gap.links if link.link == "timing"]
+    assert timing.rms_before == pytest.approx(0.3 / np.sqrt(8.0), rel=0.2)
+    assert "timing" not in [each.link for each in gap.not_examined]
 
 
 def test_another_sign_is_never_compared():

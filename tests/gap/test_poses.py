@@ -12,7 +12,9 @@ from gcode2krl.gap.beside.links import MECHANICS
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.poses import is_of_poses
 from gcode2krl.gap.fit.pose_noise import noise_of_poses, revisits
+from gcode2krl.gap.tell.first_sentence import headline
 from gcode2krl.runs import load_run
+from tests.plant import pose_arms
 
 pytestmark = pytest.mark.slow
 
@@ -165,3 +167,31 @@ def test_sound_poses_are_no_gap(tmp_path, seed):
 def test_without_a_known_robot_poses_say_nothing(tmp_path):
     gap = diagnose_log([written(tmp_path / "run")])
     assert "mechanics" in {each.link for each in gap.not_examined}
+
+
+def test_many_small_errors_are_the_arms_own_geometry(tmp_path):
+    """17 errors at once; of one alone its own name is said (above)."""
+    base, tool = CELL.frames.base, CELL.frames.tool
+    arm = pose_arms.clean(pose_arms.KR300, 0)
+    placed = {
+        "tool_mm": (tool.x_mm, tool.y_mm, tool.z_mm),
+        "place_mm": (-base.x_mm, -base.y_mm, -base.z_mm),
+        "turn_deg": (0.0, 0.0, 0.0),
+    }
+    table = pose_arms.measured(pose_arms.MadeUp(**{**arm.__dict__, **placed}), 120, 3)
+    rows = np.column_stack([30.0 * np.arange(120), table.q_deg, table.seen_mm])
+    names = ["t_s", *(f"q{n}_deg" for n in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    folder = tmp_path / "run"
+    folder.mkdir()
+    np.savetxt(folder / "poses.csv", rows, delimiter=",", header=",".join(names), comments="", fmt="%.6f")
+    (folder / "run.toml").write_text("", encoding="utf-8")
+    gap = diagnose_log([load_run(folder)], CELL)
+    assert gap.verdict in ("explained", "partly_explained")
+    first = gap.causes[0]
+    assert (first.effect, first.target) == ("geometry", None)
+    assert first.is_named
+    assert len(first.parameters) >= 8
+    assert gap.gap.rms_before > 0.3
+    assert gap.gap.rms_after < 0.06
+    assert any("neither stated nor repeated" in note for note in gap.notes)
+    assert "own geometry" in headline(gap)

@@ -26,6 +26,10 @@ class FitThresholds:
     )
 
     poses_least_again: int = convention(8, "readings of poses visited again from which they tell the noise")
+    poses_least_geometry: int = convention(40, "poses from which the arm's own geometry is fitted to them")
+    poses_geometry_share: float = convention(
+        0.8, "of the error at places left out, what may be left for the geometry to be a cause"
+    )
     poses_chance: float = convention(
         0.01, "that one of all signatures explains so much of too few poses by chance: then it is no noise"
     )

@@ -1,0 +1,71 @@
+"""Makes the measured runs of examples/runs with the robot of the tests, which shares no code with gcode2krl.
+
+It drives the joints that the test piece's prediction commands, half an hour apart, with play in axis 3 and the
+usual differences of a robot, a process and a day.
+
+    python examples/make_runs.py   with ``pip install -e ".[test]"``; a minute
+"""
+
+import sys
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from gcode2krl import predict  # noqa: E402
+from gcode2krl.cutting.guess import guessed_box  # noqa: E402
+from tests.plant import faults, folders, mismatch  # noqa: E402
+from tests.plant.instruments import Instruments  # noqa: E402
+from tests.plant.plans import Day  # noqa: E402
+from tests.plant.programs import Track  # noqa: E402
+from tests.plant.robot import simulate  # noqa: E402
+from tests.plant.scene import World  # noqa: E402
+
+PROGRAM = "examples/test_piece.nc"
+SEED, FAULT, GAP_DEG = 42, "backlash@A3", 0.03
+SLOW_s = 0.048
+"""Between two readings of the logs: they are to be small."""
+
+
+def main() -> None:
+    """Write run-1, run-2 and run-3."""
+    prediction = predict(ROOT / PROGRAM)
+    track = Track(prediction.motion.time_s, prediction.joints.q_rad)
+    rng = np.random.default_rng(SEED)
+    cutter = prediction.cell.tool[1]
+    box = guessed_box(prediction.toolpath, np.eye(3), cutter.diameter_mm / 2.0)
+    world = World(stock_mm=np.asarray(box))
+    robot = mismatch.of_robot(rng, mismatch.USUAL)
+    play = faults.build(FAULT, "same", SEED).hooks(GAP_DEG)
+    how = Instruments(
+        tracker_hz=1.0 / SLOW_s,
+        force_hz=1.0 / SLOW_s,
+        controller_s=SLOW_s,
+        q_load=False,
+        force_moments=False,
+        q_decimals=4,
+        tracker_decimals=3,
+        force_decimals=1,
+    )
+    begin = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
+    for number in range(3):
+        age_s = 1800.0 * number
+        started = begin + timedelta(seconds=age_s)
+        today = mismatch.of_day(robot, rng, mismatch.USUAL)
+        day = Day(number, "test_piece", today, started, age_s, SEED + number)
+        run = simulate(track, world, [play], today, age_s, number)
+        place = ROOT / "examples" / "runs" / f"run-{number + 1}"
+        for old in place.glob("*.*"):
+            old.unlink()
+        folders.write_run(place, day, run, how, {})
+        for table in place.glob("*.parquet"):
+            pl.read_parquet(table).write_csv(table.with_suffix(".csv"), null_value="NaN")
+            table.unlink()
+
+
+if __name__ == "__main__":
+    main()
