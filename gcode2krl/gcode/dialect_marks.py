@@ -22,6 +22,8 @@ OTHER_TIP = ord('"')
 """``TRAORI(2)``: another transformation than the first."""
 SKIPPED = ord("&")
 """A statement that says nothing to this robot."""
+LABEL = ord("0")
+"""``START:``, to which jumps lead."""
 SHIFT_SET, SHIFT_ADD = ord("="), ord("+")
 """``TRANS`` and ``ATRANS``: the axis words of the block are a shift of the zero, or are added to it."""
 CORNER_ROUND, CORNER_SIDE, CORNER_LENGTH = ord("1"), ord("2"), ord("3")
@@ -31,11 +33,15 @@ CYCLE, ARGUMENT, MODAL = ord("4"), ord("5"), ord("6")
 """``CYCLE81``, the value being its number; each of its arguments, NaN where it is left out; ``MCALL``."""
 TURN_SET, TURN_ADD, TURN_DEG, TURN_OFF = ord("7"), ord("8"), ord("9"), ord("'")
 """``ROT`` and a Fanuc's G68, ``AROT``, ``RPL=`` with its angle, and G69."""
+MIRROR_SET, MIRROR_ADD, MIRROR_OFF = 1, 2, 3
+"""``MIRROR`` and a Fanuc's G51.1, ``AMIRROR``, and G50.1: axis words name what is mirrored."""
+ARC_VIA, ARC_TANGENT, NEXT_VIA = 4, 5, 6
+"""``CIP`` and ``CT``: an arc by a point on it (``I1=`` before I, J, K), or touching what leads to it."""
 PROGRAM_NUMBER = ord(":")
 """``O1234`` alone in its line, where a program of that number begins."""
 
 HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP, TIP, FEED_AXES = range(12)
-MARKED, CYCLE_CALL, MODAL_CALL, TOOL_NAME, TURN = range(12, 17)
+MARKED, CYCLE_CALL, MODAL_CALL, TOOL_NAME, TURN, DEFINE, VARIABLE, NAMED_ARC = range(12, 20)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 32
 
@@ -46,6 +52,7 @@ MOST_CODES = 9999
 CODE_UNKNOWN, CODE_HARMLESS, CODE_EXACT, CODE_CALL, CODE_NO_OFFSET, CODE_TURN, CODE_TURN_OFF = range(
     -1, -8, -1
 )
-CODE_OFFSET, CODE_REFUSED = -8, -9
+CODE_OFFSET, CODE_MIRROR, CODE_MIRROR_OFF, CODE_REFUSED = range(-8, -12, -1)
 """Instead of a code of the core; exact stop of one block; call of a subprogram; no work offset is in force;
-the coordinates are rotated, and are no more; a further work offset; ``CODE_REFUSED - k`` for the reason k."""
+the coordinates are rotated, and are no more; a further work offset; they are mirrored, and no more;
+``CODE_REFUSED - k`` for the reason k."""

@@ -24,7 +24,7 @@ _CAM = "let the CAM post write G0, G1, G2 and G3 in the part's frame"
 REASONS: Final = (
     ("tilted working plane", f"{_CAM}: output without 3+2 cycles"),
     ("rotated coordinates", _CAM),
-    ("scaling or mirroring", _CAM),
+    ("scaling", _CAM),
     ("polar coordinates", _CAM),
     ("fine boring and back boring move the tool sideways in the hole", "mill the hole, or bore with G85"),
     ("probing or a skip signal is not a motion this program can make", "probe on the controller"),
@@ -114,8 +114,8 @@ REASONS: Final = (
     ),
     ("a cycle, and MCALL, stand in a block of their own", "give it a block of its own"),
     (
-        "of CYCLE81 and CYCLE82 are read RTP at or above RFP plus SDIS, one depth, DP or DPR, below RFP, and"
-        " a dwell in seconds; the further numbers say nothing else (0; 10 for the way to count)",
+        "of a drilling cycle are read RTP at or above RFP plus SDIS, one depth, DP or DPR, below RFP, a dwell"
+        " of a spindle that turns or in seconds, and modes that name G17, the tip and these",
         "write CYCLE81(RTP,RFP,SDIS,DP), or let the post write the cycle out in G0 and G1",
     ),
     (
@@ -129,19 +129,48 @@ REASONS: Final = (
         _CAM,
     ),
     (
-        "while the coordinates are rotated the zero stays",
-        "end the rotation before it (G69, ROT), or write it first",
+        "while the coordinates are rotated or mirrored the zero and the plane stay",
+        "end it before this block (G69, G50.1; ROT, MIRROR), or write this block first",
     ),
     (
-        "behind G68 and G69 the first move across the tool names X and Y under G90",
+        "behind G68, G69, G51.1 and G50.1 the first move across the tool names X and Y under G90",
         "write both coordinates in it",
+    ),
+    (
+        "of CYCLE83 are read one first depth, FDEP or FDPR, not below the last, DAM as a length, FRF up to 1,"
+        " VARI 0 or 1, and the tool's axis of G17",
+        "write CYCLE83(RTP,RFP,SDIS,DP,,,FDPR,0,0,0,1,1), or let the post write the cycle out in G0 and G1",
+    ),
+    (
+        "of CYCLE84 are read the pitch PIT in mm, the speed SST and what the spindle does then, SDAC 3 to 5,"
+        " in one cut",
+        "write CYCLE84(RTP,RFP,SDIS,DP,,,5,,PIT,,SST), or mill the thread",
+    ),
+    (
+        "mirroring is read in G17, of X and Y: MIRROR X0, AMIRROR Y0, G51.1 X10. in a block of its own, where"
+        " the program has not mirrored before",
+        _CAM,
+    ),
+    (
+        "an arc by a point on it has both coordinates of it (CIP X Y I1= J1=), off the chord and at its "
+        "height; one"
+        " that touches what leads to it (CT) stands behind a move in the plane that it leaves at an angle, "
+        "without"
+        " G41 and rotations",
+        "let the post write G2 and G3",
+    ),
+    ("of CYCLE85 are read both feeds, FFR in and RFF out, under G94", "write both feeds"),
+    (
+        "of CYCLE86 is read SDIR 3 or 4 without RPA, RPO and RPAP: no robot's spindle stops at an angle, by"
+        " which the tool could be moved aside in the hole",
+        "write CYCLE86(RTP,RFP,SDIS,DP,,0,3), or mill the hole",
     ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
-REASON_POLAR, REASON_OFFSET = _POLAR, _OFFSETS
+REASON_TILTED, REASON_POLAR, REASON_OFFSET = _TILTED, _POLAR, _OFFSETS
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
@@ -151,6 +180,7 @@ REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
 REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 _CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZERO = range(46, 51)
 REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
+REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_REAM, REASON_BORE = range(54, 60)
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -181,6 +211,9 @@ class Dialect:
     turn: tuple[float, ...] = ()
     """G numbers that rotate the coordinates about a point, and those that end it."""
     turn_off: tuple[float, ...] = ()
+    mirror: tuple[float, ...] = ()
+    """G numbers that mirror axes at a point, and those that end it."""
+    mirror_off: tuple[float, ...] = ()
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
     calls: tuple[float, ...] = ()
@@ -208,6 +241,8 @@ class Dialect:
     """State at the start, where it is stated by the control."""
     tool_names: Mapping[str, int] = field(default_factory=dict)
     """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
+    variables: Mapping[str, int] = field(default_factory=dict)
+    """Numbers, as parameters, of the variables that the program defines, by their names in capitals."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -226,6 +261,8 @@ class Dialect:
             (d.CODE_NO_OFFSET, self.no_offset),
             (d.CODE_TURN, self.turn),
             (d.CODE_TURN_OFF, self.turn_off),
+            (d.CODE_MIRROR, self.mirror),
+            (d.CODE_MIRROR_OFF, self.mirror_off),
         ):
             for code in codes:
                 table[_tenfold(code)] = special
@@ -249,6 +286,7 @@ class Dialect:
         """Return the names of the statements, each with a line end behind it, and their kinds."""
         pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
         pairs += [(f'"{name}"', _kind(d.TOOL_NAME, number)) for name, number in self.tool_names.items()]
+        pairs += [(name, _kind(d.VARIABLE, number)) for name, number in self.variables.items()]
         text = "".join(f"{name}\n" for name, _ in pairs).encode()
         return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
 
@@ -280,7 +318,7 @@ def _kind(kind: int, value: int = 0) -> int:
 
 _FANUC_REFUSED = {
     _TILTED: (53.1, 53.6, 54.2, 68.2, 68.3, 68.4),
-    _SCALED: (51, 51.1),
+    _SCALED: (51,),
     _POLAR: (12.1, 112, 16),
     _BORING: (76, 87),
     _PROBING: (31, 37),
@@ -301,9 +339,11 @@ _FANUC: dict[str, Any] = {
     "offsets": (54.1,),
     "turn": (68,),
     "turn_off": (69,),
+    "mirror": (51.1,),
+    "mirror_off": (50.1,),
     "same": {63: 64, 62: 64},
     "exact": (9,),
-    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69.1, 103, 187),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 67, 69.1, 103, 187),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
@@ -331,39 +371,44 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.TIP, 0): ("TRAFOOF",),
     _kind(d.FEED_AXES): ("FGROUP",),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
-    _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
+    _kind(d.REFUSED, _TILTED): ("TOROT", "TOFRAME", "TCARR"),
     _kind(d.SHIFT, 0): ("TRANS",),
-    _kind(d.JUMP): ("GOTO", "GOTOF", "GOTOB", "IF"),
+    _kind(d.JUMP): (
+        *("GOTO", "GOTOF", "GOTOB", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR", "ENDFOR", "WHILE"),
+        *("ENDWHILE", "REPEAT", "REPEATB", "UNTIL"),
+    ),
+    _kind(d.DEFINE): ("DEF",),
     _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.TURN, 0): ("ROT",),
     _kind(d.TURN, 1): ("AROT",),
+    _kind(d.NAMED_ARC, 0): ("CIP",),
+    _kind(d.NAMED_ARC, 1): ("CT",),
+    _kind(d.TURN, 2): ("MIRROR",),
+    _kind(d.TURN, 3): ("AMIRROR",),
     _kind(d.REFUSED, _ROTATED): ("ROTS", "AROTS", "CROT", "CROTS"),
-    _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
+    _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
         *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
         *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
-        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE83", "CYCLE85"),
-        *("CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
+        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79"),
+        *("CYCLE87", "CYCLE88", "CYCLE801", "CYCLE802"),
     ),
-    _kind(d.CYCLE_CALL, 81): ("CYCLE81",),
-    _kind(d.CYCLE_CALL, 82): ("CYCLE82",),
+    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800)},
     _kind(d.MODAL_CALL): ("MCALL",),
-    _kind(d.REFUSED, _THREAD): ("CYCLE84", "CYCLE840"),
-    _kind(d.REFUSED, _BORING): ("CYCLE86",),
+    _kind(d.REFUSED, _THREAD): ("CYCLE840",),
     _kind(d.REFUSED, _FLOW): (
-        *("GOTOC", "GOTOS", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
-        *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
+        *("GOTOC", "GOTOS", "CASE", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
-    _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
+    _kind(d.REFUSED, _VALUES): ("REDEF", "SET"),
     _kind(d.MARKED, d.CORNER_ROUND - d.CORNER_ROUND): ("RND",),
     _kind(d.MARKED, d.CORNER_SIDE - d.CORNER_ROUND): ("CHR",),
     _kind(d.MARKED, d.CORNER_LENGTH - d.CORNER_ROUND): ("CHF",),
     _kind(d.MARKED, d.TURN_DEG - d.CORNER_ROUND): ("RPL",),
     _kind(d.REFUSED, _CORNERS): ("RNDM", "FRC", "FRCM"),
-    _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
+    _kind(d.REFUSED, _ANGLE): ("AR", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }

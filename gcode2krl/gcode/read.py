@@ -481,7 +481,8 @@ class _Interpreter:
             cycle, m = divmod(abs(int(b)), OF_CYCLE)
             spindle: dict[str, Any] = {"rpm": a, "m": m, "line": line}
             if cycle:
-                spindle["cycle"] = f"G{cycle}"
+                of_sinumerik = self.spoken.programs == d.PROGRAMS_SINUMERIK
+                spindle["cycle"] = f"CYCLE{cycle}" if of_sinumerik else f"G{cycle}"
             return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
         if kind == EVENT_COOLANT:
             return "coolant", {"mist": b in (1.0, 3.0), "flood": b >= 2.0, "m": int(a), "line": line}

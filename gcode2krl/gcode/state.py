@@ -54,6 +54,8 @@ STATE = np.dtype(
         ("rotated", "i1"),  # the work offset in force is rotated
         ("turned_deg", "f8"),  # by the program itself: ROT, G68
         ("turned_about_mm", "f8", 2),  # the programmed point that stays
+        ("mirrored", "i4"),  # bits of X and Y, mirrored by the program at that point
+        ("flipped", "i4"),  # the same, of the zero in force
         ("turned_anew", "i1"),  # a Fanuc's next move names X and Y
         ("offsets_taken", "i1"),  # the offsets of the start are in force
         ("home_28", "f8", 3),  # machine coordinates, mm
@@ -69,6 +71,8 @@ STATE = np.dtype(
         ("length_code", "i4"),  # G43, G43.4, G43.5 or G49, tenfold
         ("feed_word", "f8"),  # F as written: degrees a minute of a turn alone
         ("arcs", "i4"),
+        ("arc_end", "f8", 2),  # direction in the plane in which the last arc ends
+        ("arc_end_rows", "i8"),  # rows behind it
         ("mist", "i1"),
         ("flood", "i1"),
         ("ended", "i1"),
@@ -142,7 +146,9 @@ STATE = np.dtype(
         ("cycle_unit_mm", "f8"),
         ("cycle_absolute", "i1"),
         ("modal_call", "i4"),  # number of the cycle behind each move that follows (MCALL), 0 = none
-        ("modal_mm", "f8", 4),  # its heights: start, bottom, end; and its dwell in seconds
+        ("modal_arguments", "i4"),  # how many it has, and which, in a unit
+        ("modal_argument", "f8", v.CYCLE_ARGUMENTS),
+        ("modal_unit_mm", "f8"),
     ],
     align=True,  # as C lays it out
 )

@@ -69,10 +69,30 @@ static void take_corner(Block *b, uint8_t c, double value) {
     b->corner_value = value * (pointless && b->machine->points == D_THOUSANDTHS ? in_inches(b) ? LEAST_INCH : LEAST : 1.0);
 }
 
-/* Take ROT, AROT, or the angle of one. */
+/* Take I1=, J1= or K1=, the coordinate `axis` of a point on the arc. */
+bool take_via(Block *b, int axis, double value) {
+    const bool repeated = b->via_named >> axis & 1;
+    b->next_word = 0;
+    b->via_named |= 1 << axis;
+    b->via[axis] = value;
+    if (repeated)
+        report(b, F_REPEATED_WORD, (Says){.a = 'I' + axis});
+    return !repeated;
+}
+
+/* Take CIP or CT: an arc whose direction is found when it is carried out. */
+static void take_named_arc(Block *b, uint8_t c) {
+    if (b->next_word || b->named_arc || b->g[V_MOTION] >= 0)
+        refuse_statement(b, DR_REASON_NAMED_ARC);
+    b->named_arc = c;
+    b->g[V_MOTION] = V_MOTION_ARC_CCW * V_TENFOLD;
+}
+
+/* Take ROT, AROT, or the angle of one; MIRROR, AMIRROR. */
 static void take_turn_of_frame(Block *b, uint8_t c, double value) {
+    const bool mirrors = c == D_MIRROR_SET || c == D_MIRROR_ADD;
     if (b->next_word || (c == D_TURN_DEG ? !b->turn || b->turn_stated : b->turn != 0))
-        refuse_statement(b, DR_REASON_TURN);
+        refuse_statement(b, mirrors ? DR_REASON_MIRROR : DR_REASON_TURN);
     b->next_word = 0;
     if (c == D_TURN_DEG)
         b->turn_stated = true, b->turned_deg = value;
@@ -86,7 +106,7 @@ static void take_call(Block *b, uint8_t c, double value) {
         b->modal = true;
     else if (c == D_CYCLE && !b->cycle)
         b->cycle = (int32_t)value;
-    else if (c == D_ARGUMENT && b->arguments < MOST_ARGUMENTS)
+    else if (c == D_ARGUMENT && b->arguments < V_CYCLE_ARGUMENTS)
         b->argument[b->arguments++] = value;
     else
         refuse_statement(b, c == D_ARGUMENT ? DR_REASON_HEIGHTS : DR_REASON_CYCLE_BESIDE);
@@ -96,16 +116,20 @@ static void take_call(Block *b, uint8_t c, double value) {
 void take_dialect_mark(Block *b, uint8_t c, double value) {
     if (c >= D_CORNER_ROUND && c <= D_CORNER_LENGTH)
         take_corner(b, c, value);
-    else if (c == D_TURN_SET || c == D_TURN_ADD || c == D_TURN_DEG)
+    else if (c == D_TURN_SET || c == D_TURN_ADD || c == D_TURN_DEG || c == D_MIRROR_SET || c == D_MIRROR_ADD)
         take_turn_of_frame(b, c, value);
+    else if (c == D_ARC_VIA || c == D_ARC_TANGENT)
+        take_named_arc(b, c);
     else if (c >= D_CYCLE && c <= D_MODAL)
         take_call(b, c, value);
     else if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
         take_shift(b, c);
     else if (c == D_TIP_ON || c == D_TIP_OFF || c == D_OTHER_TIP)
         take_tip(b, c);
-    else if (b->next_word == D_NEXT_VECTOR) /* A3=AC(1) */
+    else if (b->next_word == D_NEXT_VECTOR || b->next_word == D_NEXT_VIA) /* A3=AC(1) */
         refuse_statement(b, DR_REASON_VALUES);
+    else if (c == D_LABEL)
+        return; /* it alone keeps its line among the words, for jumps to it */
     else if (c == D_SKIPPED)
         note(b, S_NOTE_STATEMENT, 0);
     else
@@ -136,6 +160,9 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
     } else if (code == D_CODE_TURN || (code == D_CODE_TURN_OFF && b->state->turned_deg != 0.0)) {
         *good = b->turn == 0 || refuse(b, DR_REASON_TURN, (double)written);
         b->turn = code == D_CODE_TURN ? D_TURN_SET : D_TURN_OFF;
+    } else if (code == D_CODE_MIRROR || code == D_CODE_MIRROR_OFF) {
+        *good = b->turn == 0 || refuse(b, DR_REASON_MIRROR, (double)written);
+        b->turn = code == D_CODE_MIRROR ? D_MIRROR_SET : D_MIRROR_OFF;
     } else if (code == D_CODE_TURN_OFF) {
         note(b, S_NOTE_CODE, (int32_t)written);
     } else if (code == D_CODE_OFFSET) {
@@ -433,6 +460,8 @@ bool to_core_words(Block *b) {
         good = is_zero_sure(b) && good;
     if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
+    if (b->via_named && b->named_arc != D_ARC_VIA)
+        good = refuse_statement(b, DR_REASON_NAMED_ARC);
     if (b->harmless)
         good = use_harmless_words(b) && good;
     return good;

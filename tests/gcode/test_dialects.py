@@ -185,7 +185,6 @@ def test_a_message_is_kept():
             "TRANS X10 TRANS Y5",
             "TRANS X=IC(5)",
             "AROT",
-            "MIRROR X0",
             "G70",
             "G41",
             "G26 S5000",
@@ -333,7 +332,7 @@ def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
         ("G10 L10 P1 R5.", "fanuc", "G10 L2 P1 to P6"),
         ("G10 L2 P0 X5.", "fanuc", "G10 L2 P1 to P6"),
         ("G41 D1 G1 X5. F100", "fanuc", "leads in"),
-        ("MCALL CYCLE83(10,0,2,-8)", "sinumerik", "cycle"),
+        ("MCALL CYCLE83(10,0,2,-8)", "sinumerik", "first depth"),
         ('T="MILL" D1', "sinumerik", "this name"),
     ],
 )
