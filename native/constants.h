@@ -313,6 +313,8 @@
 #define D_ARC_VIA 4
 #define D_ARC_TANGENT 5
 #define D_NEXT_VIA 6
+#define D_APPROACH_CONTOUR 7
+#define D_APPROACH_NORMAL 8
 #define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
@@ -334,7 +336,15 @@
 #define D_DEFINE 17
 #define D_VARIABLE 18
 #define D_NAMED_ARC 19
+#define D_APPROACH 20
 #define D_KIND_STEP 32
+#define D_LEAD_AT_ENTRY 0
+#define D_LEAD_TO_CONTOUR 1
+#define D_LEAD_BY_CORNER 2
+#define D_D_IS_TOOL 0
+#define D_D_IS_RADIUS 1
+#define D_D_IS_DIAMETER 2
+#define D_D_IS_WEAR 3
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
 #define D_THOUSANDTHS 2
@@ -350,7 +360,9 @@
 #define D_CODE_OFFSET (-8)
 #define D_CODE_MIRROR (-9)
 #define D_CODE_MIRROR_OFF (-10)
-#define D_CODE_REFUSED (-11)
+#define D_CODE_CORNER_ARC (-11)
+#define D_CODE_CORNER_MEETING (-12)
+#define D_CODE_REFUSED (-13)
 
 /* gcode2krl.gcode.dialects */
 #define DR_REASON_TILTED 0
@@ -383,8 +395,14 @@
 #define DR_REASON_PITCH 55
 #define DR_REASON_MIRROR 56
 #define DR_REASON_NAMED_ARC 57
-#define DR_REASON_REAM 58
-#define DR_REASON_BORE 59
+#define DR_REASON_LOOK_AHEAD 58
+#define DR_REASON_ENTRY_ARC 59
+#define DR_REASON_LEAD_OUT 60
+#define DR_REASON_D 61
+#define DR_REASON_CORNERS_OF_G41 62
+#define DR_REASON_TOOL_OFFSET 63
+#define DR_REASON_REAM 64
+#define DR_REASON_BORE 65
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -544,8 +562,11 @@
 #define FM_RESTORE_LENGTH 267
 
 /* gcode2krl.gcode.state */
+#define S_MM_PER_INCH 25.4
 #define S_ZERO_DROPPED 1
 #define S_ZERO_OFF 2
+#define S_UNREAD_CORNERS 1
+#define S_UNREAD_APPROACH 2
 #define S_CUTTER_ON 1
 #define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
@@ -572,6 +593,7 @@
 #define S_NOTE_CODE 7
 #define S_NOTE_STATEMENT 8
 #define S_NOTE_SMALL_ARC 9
+#define S_AT_START (-1)
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_FIRST_G505 9
@@ -979,6 +1001,10 @@ typedef struct {
     double cutter_radius_mm;
     double cutter_other_mm[2];
     int8_t cutter_entered;
+    int8_t cutter_led;
+    int32_t cutter_idle;
+    int32_t cutter_d;
+    int32_t cutter_unread;
     int8_t cutter_failed;
     double cutter_normal[2];
     int32_t held_turn;
@@ -1112,46 +1138,50 @@ typedef char State_cutter_line_stands_at_828[offsetof(State, cutter_line) == 828
 typedef char State_cutter_radius_mm_stands_at_832[offsetof(State, cutter_radius_mm) == 832 ? 1 : -1];
 typedef char State_cutter_other_mm_stands_at_840[offsetof(State, cutter_other_mm) == 840 ? 1 : -1];
 typedef char State_cutter_entered_stands_at_856[offsetof(State, cutter_entered) == 856 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_857[offsetof(State, cutter_failed) == 857 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_864[offsetof(State, cutter_normal) == 864 ? 1 : -1];
-typedef char State_held_turn_stands_at_880[offsetof(State, held_turn) == 880 ? 1 : -1];
-typedef char State_held_line_stands_at_884[offsetof(State, held_line) == 884 ? 1 : -1];
-typedef char State_held_from_stands_at_888[offsetof(State, held_from) == 888 ? 1 : -1];
-typedef char State_held_along_stands_at_904[offsetof(State, held_along) == 904 ? 1 : -1];
-typedef char State_held_centre_stands_at_920[offsetof(State, held_centre) == 920 ? 1 : -1];
-typedef char State_held_w_stands_at_936[offsetof(State, held_w) == 936 ? 1 : -1];
-typedef char State_held_sweep_stands_at_952[offsetof(State, held_sweep) == 952 ? 1 : -1];
-typedef char State_held_rows_stands_at_960[offsetof(State, held_rows) == 960 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_976[offsetof(State, cutter_rows_removed) == 976 ? 1 : -1];
-typedef char State_held_events_stands_at_984[offsetof(State, held_events) == 984 ? 1 : -1];
-typedef char State_corner_stands_at_992[offsetof(State, corner) == 992 ? 1 : -1];
-typedef char State_corner_line_stands_at_996[offsetof(State, corner_line) == 996 ? 1 : -1];
-typedef char State_corner_mm_stands_at_1000[offsetof(State, corner_mm) == 1000 ? 1 : -1];
-typedef char State_corner_from_mm_stands_at_1008[offsetof(State, corner_from_mm) == 1008 ? 1 : -1];
-typedef char State_corner_mm_s_stands_at_1032[offsetof(State, corner_mm_s) == 1032 ? 1 : -1];
-typedef char State_corner_rows_stands_at_1040[offsetof(State, corner_rows) == 1040 ? 1 : -1];
-typedef char State_corner_events_stands_at_1048[offsetof(State, corner_events) == 1048 ? 1 : -1];
-typedef char State_retract_stands_at_1056[offsetof(State, retract) == 1056 ? 1 : -1];
-typedef char State_retract_line_stands_at_1060[offsetof(State, retract_line) == 1060 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_1064[offsetof(State, unset_parameter) == 1064 ? 1 : -1];
-typedef char State_unset_line_stands_at_1068[offsetof(State, unset_line) == 1068 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_1072[offsetof(State, retract_unnamed_line) == 1072 ? 1 : -1];
-typedef char State_in_cycles_stands_at_1076[offsetof(State, in_cycles) == 1076 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_1080[offsetof(State, cycle_level_mm) == 1080 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_1088[offsetof(State, cycle_level_known) == 1088 ? 1 : -1];
-typedef char State_cycle_r_stands_at_1096[offsetof(State, cycle_r) == 1096 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_1104[offsetof(State, cycle_depth) == 1104 ? 1 : -1];
-typedef char State_cycle_q_stands_at_1112[offsetof(State, cycle_q) == 1112 ? 1 : -1];
-typedef char State_cycle_p_stands_at_1120[offsetof(State, cycle_p) == 1120 ? 1 : -1];
-typedef char State_cycle_line_stands_at_1128[offsetof(State, cycle_line) == 1128 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_1132[offsetof(State, cycle_plane) == 1132 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_1136[offsetof(State, cycle_unit_mm) == 1136 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_1144[offsetof(State, cycle_absolute) == 1144 ? 1 : -1];
-typedef char State_modal_call_stands_at_1148[offsetof(State, modal_call) == 1148 ? 1 : -1];
-typedef char State_modal_arguments_stands_at_1152[offsetof(State, modal_arguments) == 1152 ? 1 : -1];
-typedef char State_modal_argument_stands_at_1160[offsetof(State, modal_argument) == 1160 ? 1 : -1];
-typedef char State_modal_unit_mm_stands_at_1352[offsetof(State, modal_unit_mm) == 1352 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 1360 ? 1 : -1];
+typedef char State_cutter_led_stands_at_857[offsetof(State, cutter_led) == 857 ? 1 : -1];
+typedef char State_cutter_idle_stands_at_860[offsetof(State, cutter_idle) == 860 ? 1 : -1];
+typedef char State_cutter_d_stands_at_864[offsetof(State, cutter_d) == 864 ? 1 : -1];
+typedef char State_cutter_unread_stands_at_868[offsetof(State, cutter_unread) == 868 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_872[offsetof(State, cutter_failed) == 872 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_880[offsetof(State, cutter_normal) == 880 ? 1 : -1];
+typedef char State_held_turn_stands_at_896[offsetof(State, held_turn) == 896 ? 1 : -1];
+typedef char State_held_line_stands_at_900[offsetof(State, held_line) == 900 ? 1 : -1];
+typedef char State_held_from_stands_at_904[offsetof(State, held_from) == 904 ? 1 : -1];
+typedef char State_held_along_stands_at_920[offsetof(State, held_along) == 920 ? 1 : -1];
+typedef char State_held_centre_stands_at_936[offsetof(State, held_centre) == 936 ? 1 : -1];
+typedef char State_held_w_stands_at_952[offsetof(State, held_w) == 952 ? 1 : -1];
+typedef char State_held_sweep_stands_at_968[offsetof(State, held_sweep) == 968 ? 1 : -1];
+typedef char State_held_rows_stands_at_976[offsetof(State, held_rows) == 976 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_992[offsetof(State, cutter_rows_removed) == 992 ? 1 : -1];
+typedef char State_held_events_stands_at_1000[offsetof(State, held_events) == 1000 ? 1 : -1];
+typedef char State_corner_stands_at_1008[offsetof(State, corner) == 1008 ? 1 : -1];
+typedef char State_corner_line_stands_at_1012[offsetof(State, corner_line) == 1012 ? 1 : -1];
+typedef char State_corner_mm_stands_at_1016[offsetof(State, corner_mm) == 1016 ? 1 : -1];
+typedef char State_corner_from_mm_stands_at_1024[offsetof(State, corner_from_mm) == 1024 ? 1 : -1];
+typedef char State_corner_mm_s_stands_at_1048[offsetof(State, corner_mm_s) == 1048 ? 1 : -1];
+typedef char State_corner_rows_stands_at_1056[offsetof(State, corner_rows) == 1056 ? 1 : -1];
+typedef char State_corner_events_stands_at_1064[offsetof(State, corner_events) == 1064 ? 1 : -1];
+typedef char State_retract_stands_at_1072[offsetof(State, retract) == 1072 ? 1 : -1];
+typedef char State_retract_line_stands_at_1076[offsetof(State, retract_line) == 1076 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_1080[offsetof(State, unset_parameter) == 1080 ? 1 : -1];
+typedef char State_unset_line_stands_at_1084[offsetof(State, unset_line) == 1084 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_1088[offsetof(State, retract_unnamed_line) == 1088 ? 1 : -1];
+typedef char State_in_cycles_stands_at_1092[offsetof(State, in_cycles) == 1092 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_1096[offsetof(State, cycle_level_mm) == 1096 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_1104[offsetof(State, cycle_level_known) == 1104 ? 1 : -1];
+typedef char State_cycle_r_stands_at_1112[offsetof(State, cycle_r) == 1112 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_1120[offsetof(State, cycle_depth) == 1120 ? 1 : -1];
+typedef char State_cycle_q_stands_at_1128[offsetof(State, cycle_q) == 1128 ? 1 : -1];
+typedef char State_cycle_p_stands_at_1136[offsetof(State, cycle_p) == 1136 ? 1 : -1];
+typedef char State_cycle_line_stands_at_1144[offsetof(State, cycle_line) == 1144 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_1148[offsetof(State, cycle_plane) == 1148 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_1152[offsetof(State, cycle_unit_mm) == 1152 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_1160[offsetof(State, cycle_absolute) == 1160 ? 1 : -1];
+typedef char State_modal_call_stands_at_1164[offsetof(State, modal_call) == 1164 ? 1 : -1];
+typedef char State_modal_arguments_stands_at_1168[offsetof(State, modal_arguments) == 1168 ? 1 : -1];
+typedef char State_modal_argument_stands_at_1176[offsetof(State, modal_argument) == 1176 ? 1 : -1];
+typedef char State_modal_unit_mm_stands_at_1368[offsetof(State, modal_unit_mm) == 1368 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1376 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1508,6 +1538,9 @@ typedef struct {
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
+    int64_t lead;
+    int64_t square_corners;
+    int64_t d_holds;
     int64_t programs;
     int64_t has_m61_to_m73;
     int64_t mounted_tool;

@@ -8,7 +8,7 @@ what a control does depends on its parameters, or is in doubt, the block is refu
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -63,7 +63,11 @@ REASONS: Final = (
         "remove the block; state them in [work_offsets] and [tool.N] of the cell",
     ),
     ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
-    ("how this control leads in and out is not known", "let the post write the path of the tool's centre"),
+    (
+        "how this control leads in and out, and what D holds, are parameters of the control",
+        'state lead_in = "a" or "b" and d = "radius", "diameter" or "wear" in [program.cutter] of the cell,'
+        " or let the post write the path of the tool's centre",
+    ),
     (
         "the spindle stands still, so its turns take no time",
         "start the spindle, or write G4 F in seconds",
@@ -159,6 +163,35 @@ REASONS: Final = (
         " G41 and rotations",
         "let the post write G2 and G3",
     ),
+    (
+        "between two moves of a compensated contour stand blocks without a move in its plane, and how many "
+        "the"
+        " control looks past to see the corner is a parameter",
+        "write them before or behind the contour",
+    ),
+    (
+        "compensation begins with an arc, which is an alarm on this control",
+        "lead in with G1",
+    ),
+    (
+        "behind G40 the first move leads along the tool, and where the control then takes the offset off is "
+        "not sure",
+        "move in X or Y first, away from the contour",
+    ),
+    (
+        "D names another offset than that of the tool in the spindle, or none was named",
+        "write D with the tool's number; D0 for no compensation",
+    ),
+    (
+        "G451 and KONT decide how a compensated contour is led to and around corners",
+        "write NORM and G450, which are the start-up settings",
+    ),
+    (
+        "G10 L10 to L13 set what the cell states: R has to be length (L10) and size (L12) of the tool P "
+        "there, 0 as"
+        " wear (L11, L13), under G90, with d in [program.cutter]",
+        "remove the block, or correct [tool.N] of the cell",
+    ),
     ("of CYCLE85 are read both feeds, FFR in and RFF out, under G94", "write both feeds"),
     (
         "of CYCLE86 is read SDIR 3 or 4 without RPA, RPO and RPAP: no robot's spindle stops at an angle, by"
@@ -180,7 +213,9 @@ REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
 REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 _CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZERO = range(46, 51)
 REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
-REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_REAM, REASON_BORE = range(54, 60)
+REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_LOOK_AHEAD = range(54, 59)
+REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_CORNERS_OF_G41, REASON_TOOL_OFFSET = range(59, 64)
+REASON_REAM, REASON_BORE = 64, 65
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -214,6 +249,9 @@ class Dialect:
     mirror: tuple[float, ...] = ()
     """G numbers that mirror axes at a point, and those that end it."""
     mirror_off: tuple[float, ...] = ()
+    corner_arc: tuple[float, ...] = ()
+    """G numbers that lead around corners of a compensated contour by an arc, and to where its sides meet."""
+    corner_meeting: tuple[float, ...] = ()
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
     calls: tuple[float, ...] = ()
@@ -237,6 +275,12 @@ class Dialect:
     """Letters that say nothing to what is read of this control: D, which G41 and G42 alone use."""
     length_by_d: bool = False
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
+    lead: int = d.LEAD_AT_ENTRY
+    """How G41 and G42 lead in, of `dialect_marks`."""
+    square_corners: bool = False
+    """Outside corners of a compensated contour are straight moves."""
+    d_holds: int = d.D_IS_TOOL
+    """What D of G41 and G42 says, of `dialect_marks`."""
     start: Mapping[str, float] = field(default_factory=dict)
     """State at the start, where it is stated by the control."""
     tool_names: Mapping[str, int] = field(default_factory=dict)
@@ -263,6 +307,8 @@ class Dialect:
             (d.CODE_TURN_OFF, self.turn_off),
             (d.CODE_MIRROR, self.mirror),
             (d.CODE_MIRROR_OFF, self.mirror_off),
+            (d.CODE_CORNER_ARC, self.corner_arc),
+            (d.CODE_CORNER_MEETING, self.corner_meeting),
         ):
             for code in codes:
                 table[_tenfold(code)] = special
@@ -304,6 +350,9 @@ class Dialect:
             "g80_keeps_motion": int(self.g80_keeps_motion),
             "idle_letters": sum(1 << v.index_of(letter) for letter in self.idle_letters),
             "end_m": self.end_m,
+            "lead": self.lead,
+            "square_corners": int(self.square_corners),
+            "d_holds": self.d_holds,
             "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
         }
 
@@ -362,8 +411,8 @@ _SINUMERIK_STATEMENTS = {
         *("FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "STOPRE", "FIFOCTRL", "STARTFIFO", "STOPFIFO"),
         *("DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "UPATH", "SPATH"),
         *("ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORISOF", "ORISON", "ORIRESET"),
-        *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2", "KONT"),
-        *("NORM", "DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
+        *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2"),
+        *("DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
         *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
         "FGREF",
     ),
@@ -381,6 +430,8 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.TURN, 0): ("ROT",),
     _kind(d.TURN, 1): ("AROT",),
+    _kind(d.APPROACH, 0): ("KONT",),
+    _kind(d.APPROACH, 1): ("NORM",),
     _kind(d.NAMED_ARC, 0): ("CIP",),
     _kind(d.NAMED_ARC, 1): ("CT",),
     _kind(d.TURN, 2): ("MIRROR",),
@@ -430,12 +481,15 @@ _LIST: Final = (
         "Sinumerik 840D sl, as CAM posts write it",
         programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
-        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
+        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
         no_offset=(500,),
         offsets=tuple(range(505, 600)),
-        harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
+        corner_arc=(450,),
+        corner_meeting=(451,),
+        lead=d.LEAD_TO_CONTOUR,
+        harmless=(5, 601, 602, 603, 290, 460, 461, 462, 810, 811, 812, 621, 62),
         refused={
             _THREAD: (33, 34, 35, 331, 332, 63),
             _POLAR: (110, 111, 112),
@@ -444,7 +498,6 @@ _LIST: Final = (
             _SHIFT: (58, 59),
             _SETTING: (25, 26),
             _INCHES: (70,),
-            _LEAD: (41, 42),
         },
         dwell_s={"F": 1.0},
         dwell_turns="S",
@@ -458,6 +511,20 @@ DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _
 DEFAULT: Final = DIALECT_NAMES[0]
 OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
 CONVERSATIONAL: Final = "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
+
+
+_LEADS: Final = {"a": d.LEAD_TO_CONTOUR, "b": d.LEAD_BY_CORNER}
+_D_HOLDS: Final = {"radius": d.D_IS_RADIUS, "diameter": d.D_IS_DIAMETER, "wear": d.D_IS_WEAR}
+
+
+def with_cutter(dialect: Dialect, lead_in: str | None, holds: str | None) -> Dialect:
+    """Return a Fanuc's dialect with G41 and G42, where the cell states how they lead in and what D holds."""
+    if dialect.programs != d.PROGRAMS_FANUC or lead_in is None or holds is None:
+        return dialect
+    refused = {**dialect.refused, _LEAD: (41.1, 42.1)}
+    return replace(
+        dialect, refused=refused, lead=_LEADS[lead_in], square_corners=True, d_holds=_D_HOLDS[holds]
+    )
 
 
 def dialect_of(name: str, source: str) -> Dialect:

@@ -18,7 +18,7 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
-from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
+from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of, with_cutter
 from gcode2krl.gcode.findings import DIALECT_STATEMENT
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
@@ -43,6 +43,7 @@ from gcode2krl.gcode.state import (
     OF_CYCLE,
     WORK_OFFSETS,
     initial_state,
+    start_of,
 )
 from gcode2krl.gcode.text import beginning, pieces
 from gcode2krl.gcode.tool_comments import (
@@ -164,7 +165,7 @@ def read_stream(
 
     ``folders`` are all in which a file of a subprogram may be.
     """
-    spoken = replace(dialect_of(dialect, name), tool_names=tool_table.tools_by_name(cell))
+    spoken = replace(_of_cell(dialect_of(dialect, name), cell), tool_names=tool_table.tools_by_name(cell))
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -231,6 +232,16 @@ def _interpreted(
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
     return head, named
+
+
+def _of_cell(dialect: Dialect, cell: "Cell | None") -> Dialect:
+    """Return a dialect as the control of a cell speaks it: its start-up modes, and its cutter
+    compensation."""
+    if cell is None:
+        return dialect
+    cutter, modes = cell.program.cutter, cell.program.start.model_dump(exclude_none=True)
+    start = {**dialect.start, **start_of(modes)}
+    return replace(with_cutter(dialect, cutter.lead_in, cutter.d), start=start)
 
 
 def _mounted_tool(cell: "Cell | None") -> int:

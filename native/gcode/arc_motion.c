@@ -156,7 +156,7 @@ static void report_unknown_start(Block *b) {
         b->counts->consequences++;
     else
         report_at(b, (int32_t)least(b->line, s->unknown_feed_line), F_UNKNOWN_START,
-                  (Says){.a = s->absolute ? 0 : s->distance_line});
+                  (Says){.a = s->absolute ? 0 : most(0, s->distance_line)});
     s->unknown_reported = 1;
 }
 

@@ -328,6 +328,7 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
     case D_SHIFT:
         put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
         return end;
+    case D_APPROACH: put(scan, kind / D_KIND_STEP == 0 ? D_APPROACH_CONTOUR : D_APPROACH_NORMAL, 0.0, line); return end;
     case D_NAMED_ARC: put(scan, kind / D_KIND_STEP == 0 ? D_ARC_VIA : D_ARC_TANGENT, 0.0, line); return end;
     case D_TURN: {
         static const int MARK[] = {D_TURN_SET, D_TURN_ADD, D_MIRROR_SET, D_MIRROR_ADD};

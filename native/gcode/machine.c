@@ -260,6 +260,8 @@ static bool execute(Block *b) {
         if (!move(b) || !modal_cycle(b))
             return false;
     }
+    const bool across = moves && (b->has[V_WORD_X] || b->has[V_WORD_Y] || names_centre_alone(b));
+    b->state->cutter_idle = across ? 0 : b->state->cutter_idle + 1;
     report_unused(b);
     stop(b);
     return true;

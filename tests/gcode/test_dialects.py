@@ -329,7 +329,7 @@ def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
         ("G1 X5 CHR=1 F100", "sinumerik", "corner"),
         ("G83 X5. Z-5. R1. Q2. F100 L0", "fanuc", "drill nothing"),
         ("G81 X5. Z-5. R1. F100 K0", "fanuc", "drill nothing"),
-        ("G10 L10 P1 R5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G10 L10 P1 R5.", "fanuc", "what the cell states"),
         ("G10 L2 P0 X5.", "fanuc", "G10 L2 P1 to P6"),
         ("G41 D1 G1 X5. F100", "fanuc", "leads in"),
         ("MCALL CYCLE83(10,0,2,-8)", "sinumerik", "first depth"),

@@ -120,9 +120,9 @@ def test_who_follows_a_remedy_gets_the_program_it_promises(code):
 @pytest.mark.parametrize("name", REMEDIES["reason"])
 def test_who_follows_the_remedy_of_a_reason_gets_the_program_it_promises(name):
     entry = REMEDIES["reason"][name]
-    refused, _ = outcome(entry, entry["refused"], None)
+    refused, _ = outcome(entry, entry["refused"], entry.get("of"))
     assert any(entry["says"] in issue.message + issue.remedy for issue in refused)
-    found, tip = outcome(entry, entry["mended"], entry.get("cell"))
+    found, tip = outcome(entry, entry["mended"], entry.get("cell") or entry.get("of"))
     assert not {issue.code for issue in found} & {"dialect-code", "dialect-statement"}
     assert tip == pytest.approx(entry["tip"], abs=1e-9)
 
