@@ -239,7 +239,8 @@
 #define V_CYCLE_BORE_STOP 86
 #define V_CYCLE_BORE 89
 #define V_CYCLE_SWIVEL 800
-#define V_CYCLE_ARGUMENTS 24
+#define V_CYCLE_BEHIND 1000
+#define V_CYCLE_ARGUMENTS 26
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
 #define V_PLANE_YZ 19
@@ -365,6 +366,7 @@
 #define D_CODE_REFUSED (-13)
 
 /* gcode2krl.gcode.dialects */
+#define DR_FIRST_REAL 100
 #define DR_REASON_TILTED 0
 #define DR_REASON_POLAR 3
 #define DR_REASON_OFFSET 7
@@ -401,8 +403,25 @@
 #define DR_REASON_D 61
 #define DR_REASON_CORNERS_OF_G41 62
 #define DR_REASON_TOOL_OFFSET 63
-#define DR_REASON_REAM 64
-#define DR_REASON_BORE 65
+#define DR_REASON_FREE_CONTOUR 64
+#define DR_REASON_TNC_INCHES 65
+#define DR_REASON_TOOL_CALL 66
+#define DR_REASON_TNC_LABEL 67
+#define DR_REASON_TNC_POLE 68
+#define DR_REASON_TNC_ARC 69
+#define DR_REASON_TNC_WORD 70
+#define DR_REASON_TNC_M 71
+#define DR_REASON_HOLE 72
+#define DR_REASON_REAM 73
+#define DR_REASON_BORE 74
+#define DR_REASON_ROTATED 1
+#define DR_REASON_SCALED 2
+#define DR_REASON_BORING 4
+#define DR_REASON_PROBING 5
+#define DR_REASON_CYCLE 8
+#define DR_REASON_SMOOTH 15
+#define DR_REASON_SHIFT 20
+#define DR_FIRST_VARIABLE 100
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -415,7 +434,6 @@
 #define DR_REASON_MOVED 29
 #define DR_DEFAULT "linuxcnc"
 #define DR_OTHER_POST "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
-#define DR_CONVERSATIONAL "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 /* gcode2krl.gcode.findings */
 #define F_OK 0
@@ -1042,7 +1060,7 @@ typedef struct {
     int8_t cycle_absolute;
     int32_t modal_call;
     int32_t modal_arguments;
-    double modal_argument[24];
+    double modal_argument[26];
     double modal_unit_mm;
 } State;
 typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
@@ -1180,8 +1198,8 @@ typedef char State_cycle_absolute_stands_at_1160[offsetof(State, cycle_absolute)
 typedef char State_modal_call_stands_at_1164[offsetof(State, modal_call) == 1164 ? 1 : -1];
 typedef char State_modal_arguments_stands_at_1168[offsetof(State, modal_arguments) == 1168 ? 1 : -1];
 typedef char State_modal_argument_stands_at_1176[offsetof(State, modal_argument) == 1176 ? 1 : -1];
-typedef char State_modal_unit_mm_stands_at_1368[offsetof(State, modal_unit_mm) == 1368 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 1376 ? 1 : -1];
+typedef char State_modal_unit_mm_stands_at_1384[offsetof(State, modal_unit_mm) == 1384 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1392 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {

@@ -19,6 +19,7 @@ from gcode2krl.errors import input_error
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.program_tables import FIRST_REAL
 
 _CAM = "let the CAM post write G0, G1, G2 and G3 in the part's frame"
 REASONS: Final = (
@@ -192,6 +193,37 @@ REASONS: Final = (
         " wear (L11, L13), under G90, with d in [program.cutter]",
         "remove the block, or correct [tool.N] of the cell",
     ),
+    ("a contour of free programming (FK)", "let the post write L, C, CR and CT"),
+    (
+        "whether F is in inches or tenths of them a minute is not sure",
+        "let the post write mm: BEGIN PGM … MM",
+    ),
+    (
+        "of TOOL CALL are read the tool, the axis Z, S and F, and DL and DR of 0",
+        "state lengths and diameters in [tool.N] of the cell",
+    ),
+    (
+        "a label that is called stands once in the program, and a called subprogram ends with LBL 0",
+        "add LBL 0",
+    ),
+    (
+        "the pole CC is read with absolute X and Y before what counts from it; LP with PR and PA, a part of "
+        "a turn where"
+        " the tool's place is known",
+        "let the post write X and Y",
+    ),
+    (
+        "of arcs are read C with X, Y and DR, CR with R and DR, CT, CP with PA or IPA of the sign of DR",
+        "let the post write them so",
+    ),
+    ("a word that is not read in this block", "check the word, or let the post write another"),
+    ("this M-code changes how the control moves", "let the post leave it out, or write what it stands for"),
+    (
+        "of drilling cycles are read 200, 201, 203 without Q212 and Q213 and out at FMAX or in one stroke, "
+        "207 behind"
+        " a TOOL CALL with S, with Q200 to Q206 stated, defined before the call",
+        "let the post write L, or cycle 200 with its Q words",
+    ),
     ("of CYCLE85 are read both feeds, FFR in and RFF out, under G94", "write both feeds"),
     (
         "of CYCLE86 is read SDIR 3 or 4 without RPA, RPO and RPAP: no robot's spindle stops at an angle, by"
@@ -215,7 +247,11 @@ _CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZE
 REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
 REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_LOOK_AHEAD = range(54, 59)
 REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_CORNERS_OF_G41, REASON_TOOL_OFFSET = range(59, 64)
-REASON_REAM, REASON_BORE = 64, 65
+REASON_FREE_CONTOUR, REASON_TNC_INCHES, REASON_TOOL_CALL, REASON_TNC_LABEL, REASON_TNC_POLE = range(64, 69)
+REASON_TNC_ARC, REASON_TNC_WORD, REASON_TNC_M, REASON_HOLE, REASON_REAM, REASON_BORE = range(69, 75)
+REASON_ROTATED, REASON_SCALED, REASON_BORING, REASON_PROBING = _ROTATED, _SCALED, _BORING, _PROBING
+REASON_CYCLE, REASON_SMOOTH, REASON_SHIFT = _CYCLE, _SMOOTH, _SHIFT
+FIRST_VARIABLE = FIRST_REAL
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -283,6 +319,8 @@ class Dialect:
     """What D of G41 and G42 says, of `dialect_marks`."""
     start: Mapping[str, float] = field(default_factory=dict)
     """State at the start, where it is stated by the control."""
+    is_conversational: bool = False
+    """Its text is translated into that of a Sinumerik before it is read (`heidenhain`)."""
     tool_names: Mapping[str, int] = field(default_factory=dict)
     """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
     variables: Mapping[str, int] = field(default_factory=dict)
@@ -506,11 +544,27 @@ _LIST: Final = (
         length_by_d=True,
     ),
 )
-DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _LIST}
+_OF_TNC = {
+    _kind(d.HARMLESS): ("NOTED",),
+    _kind(d.CYCLE_CALL, v.CYCLE_BEHIND): ("HOLE",),
+    **{_kind(d.REFUSED, reason): (f"REFUSED_{reason}",) for reason in range(len(REASONS))},
+}
+_SINUMERIK = next(dialect for dialect in _LIST if dialect.name == "sinumerik")
+_HEIDENHAIN = replace(
+    _SINUMERIK,
+    name="heidenhain",
+    title="Heidenhain's conversational programs, as CAM posts write them",
+    syntax=d.STATEMENTS,
+    statements={
+        kind: (*_SINUMERIK.statements.get(kind, ()), *_OF_TNC.get(kind, ()))
+        for kind in (*_SINUMERIK.statements, *_OF_TNC)
+    },
+    is_conversational=True,
+)
+DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in (*_LIST, _HEIDENHAIN)}
 """The dialects by their names, the default first."""
 DEFAULT: Final = DIALECT_NAMES[0]
 OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
-CONVERSATIONAL: Final = "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 
 _LEADS: Final = {"a": d.LEAD_TO_CONTOUR, "b": d.LEAD_BY_CORNER}
@@ -531,7 +585,5 @@ def dialect_of(name: str, source: str) -> Dialect:
     """Return a dialect by its name; raises `NotUnderstoodError` where it is none that is read."""
     if name in DIALECTS:
         return DIALECTS[name]
-    if name == "heidenhain":
-        raise input_error("dialect-unknown", CONVERSATIONAL, OTHER_POST, source=source)
     allowed = ", ".join(DIALECTS)
     raise input_error("dialect-unknown", f"dialect {name!r}; allowed: {allowed}", source=source)

@@ -109,7 +109,7 @@ class Program:
         text = text if text.endswith(b"\n") else text + b"\n"
         self.files.append(File(name, first_line, text, start_line))
         if self._spoken.programs == d.PROGRAMS_SINUMERIK:
-            self._spoken = replace(self._spoken, variables=variables_of(text))
+            self._spoken = replace(self._spoken, variables={**self._spoken.variables, **variables_of(text)})
             self._program.statement_names, self._program.statement_kinds = self._spoken.names()
         scanned, lines = Scanner(self._spoken).scan_whole(text, first_line)
         self.most_decimals = max(self.most_decimals, scanned.most_decimals)

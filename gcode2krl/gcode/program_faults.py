@@ -90,8 +90,8 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
         "write two blocks",
     ),
     SIEMENS_UNDEFINED: (
-        "the variable is used before the line that defines it (DEF) has run",
-        "write DEF at the beginning of the program",
+        "a variable, or the pole CC, is used before the line that sets it has run",
+        "set it at the beginning of the program (DEF; Q5 = 0)",
     ),
     SIEMENS_DEF: (
         "of DEF are read REAL, INT and BOOL with names of their own, and a value behind =",

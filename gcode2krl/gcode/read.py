@@ -1,5 +1,6 @@
 """``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
 
+import io
 import math
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -20,6 +21,7 @@ from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of, with_cutter
 from gcode2krl.gcode.findings import DIALECT_STATEMENT
+from gcode2krl.gcode.heidenhain import Translator
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
@@ -189,7 +191,10 @@ def read_stream(
         mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
-    with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
+    read_pieces = pieces(stream, name)
+    if spoken.is_conversational:
+        read_pieces, spoken = interpreter.translate(read_pieces)
+    with ahead(_scanned(read_pieces, spoken)) as scanned:
         head, named = _interpreted(interpreter, scanned, spoken, name, _size_of(stream), folders, progress)
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
@@ -334,6 +339,20 @@ class _Interpreter:
         self.most_decimals = 0
         self.rest_line = 0
         self.program: Program | None = None
+        self.original: list[bytes] | None = None
+        """Lines of a program that was translated."""
+
+    def translate(
+        self, read_pieces: Iterator[tuple[int, bytes]]
+    ) -> tuple[Iterator[tuple[int, bytes]], Dialect]:
+        """Return a conversational program as the core reads it, in pieces, and its dialect with its
+        variables."""
+        text = b"".join(piece for _, piece in read_pieces)
+        translator = Translator(text.decode("utf-8", "replace"))
+        translated = translator.text().encode()
+        self.original = text.split(b"\n")
+        self.spoken = replace(self.spoken, variables=translator.variables())
+        return pieces(io.BytesIO(translated), self.name), self.spoken
 
     @property
     def ended(self) -> bool:
@@ -420,6 +439,8 @@ class _Interpreter:
 
     def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
+        if self.original is not None:
+            self.texts = {n: self.original[n - 1] for n in self.texts if 0 < n <= len(self.original)}
         known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if self.state["corner"][0]:  # the program has ended before the block that makes it
             line = int(self.state["corner_line"][0])

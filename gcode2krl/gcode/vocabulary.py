@@ -83,8 +83,11 @@ CYCLE_TAP, CYCLE_REAM, CYCLE_BORE_STOP, CYCLE_BORE = 84, 85, 86, 89
 """Canned cycles among the motion modes; no other mode has a number as large as the first."""
 CYCLE_SWIVEL = 800
 """Of a Sinumerik, CYCLE800."""
-CYCLE_ARGUMENTS = 24
-"""Arguments of a Sinumerik's CYCLE84, which has most."""
+CYCLE_BEHIND = 1000
+"""A hole behind the move of its block: the arguments are kind and feed, and then those of the cycle of
+that kind."""
+CYCLE_ARGUMENTS = 26
+"""Arguments of a Sinumerik's CYCLE84, which has most, and these two."""
 PLANE_XY, PLANE_ZX, PLANE_YZ = 17, 18, 19
 """Planes of the state: the G number."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95

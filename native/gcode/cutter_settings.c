@@ -158,6 +158,8 @@ void cutter_compensation(Block *b) {
     } else if (code >= 0) {
         b->used[V_WORD_D] |= b->has[V_WORD_D];
         b->used[V_WORD_L] |= b->has[V_WORD_L];
+        if (b->state->cutter_mode & S_CUTTER_ON && b->machine->lead && code == b->state->cutter_code)
+            return; /* it says what is in force */
         if (b->state->cutter_mode & S_CUTTER_ON)
             refuse_under_compensation(b, code);
         else

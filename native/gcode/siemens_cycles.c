@@ -279,7 +279,8 @@ static bool hole_of(Block *b, Cycle *c) {
     }
 }
 
-static bool drill(Block *b) {
+/* Drill where the tool stands, with the feed in force or a stated one. */
+static bool drill(Block *b, double mm_s) {
     State *s = b->state;
     Cycle c = cycle_of(b);
     const int8_t exact_stop = s->exact_stop;
@@ -291,7 +292,8 @@ static bool drill(Block *b) {
     if (!take_arguments(b, &c))
         return true;
     const bool own_feed = c.motion == V_CYCLE_TAP || c.motion == V_CYCLE_REAM;
-    const int finding = own_feed ? F_OK : s->feed_mode == V_INVERSE_TIME ? F_NO_INVERSE_TIME : feed_speed(b, 0.0, &c.mm_s);
+    c.mm_s = mm_s;
+    const int finding = own_feed || mm_s > 0.0 ? F_OK : s->feed_mode == V_INVERSE_TIME ? F_NO_INVERSE_TIME : feed_speed(b, 0.0, &c.mm_s);
     if (finding != F_OK) {
         report_speed(b, finding);
         return true;
@@ -334,7 +336,7 @@ bool cycle_call(Block *b) {
     if (b->cycle == V_CYCLE_SWIVEL)
         return swivel(b);
     if (!b->modal)
-        return drill(b);
+        return drill(b, 0.0);
     s->modal_call = 0;
     if (!b->cycle || !take_arguments(b, &c))
         return true;
@@ -344,6 +346,19 @@ bool cycle_call(Block *b) {
     for (int k = 0; k < b->arguments; k++)
         s->modal_argument[k] = b->argument[k];
     return true;
+}
+
+/* Drill behind the move of the block; return false where there is no room. */
+bool hole_behind(Block *b) {
+    enum { OWN = 2 };
+    const double kind = b->argument[0], mm_s = b->argument[1] * b->state->unit_mm / U_S_PER_MIN;
+    b->arguments -= OWN;
+    for (int k = 0; k < b->arguments; k++)
+        b->argument[k] = b->argument[k + OWN];
+    b->cycle = (int32_t)kind;
+    if (b->arguments < OWN || !(mm_s > 0.0) || !(kind == V_CYCLE_PECK || kind == V_CYCLE_TAP || kind == V_CYCLE_REAM))
+        return !refuse(b, DR_REASON_HOLE);
+    return drill(b, mm_s);
 }
 
 /* Drill behind a move under MCALL; return false where there is no room. */
@@ -359,7 +374,7 @@ bool modal_cycle(Block *b) {
     for (int k = 0; k < b->arguments; k++)
         b->argument[k] = s->modal_argument[k];
     s->unit_mm = s->modal_unit_mm;
-    const bool done = drill(b);
+    const bool done = drill(b, 0.0);
     s->unit_mm = unit_mm;
     return done;
 }

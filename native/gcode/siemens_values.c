@@ -100,7 +100,6 @@ static int64_t variable_at(Evaluation *e, int64_t *i) {
 
 /* WIDTH=..., whose number is known and whose value stands at `value`; return the place behind. */
 int64_t assign_variable(Evaluation *e, int64_t number, int64_t place, int64_t value) {
-    value_of(e, number, place);
     const double result = siemens_value(e, &value);
     keep(e, number, result, place);
     return value;
