@@ -23,8 +23,9 @@ from gcode2krl.gcode import dialects as r
 _NUMBER = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 _VALUE = rf"(?:{_NUMBER}|[+-]?Q\d+)"
 _TOKEN = re.compile(
-    rf"(?P<inc>I?)(?P<axis>[XYZABC]|PR|PA)(?P<value>{_VALUE})|(?P<side>R[0LR])\b|F(?P<feed>MAX|AUTO|{_VALUE})"
-    rf"|DR(?P<way>[+-])|R(?P<radius>{_VALUE})|M(?P<m>\d+)|(?P<limit>MB *MAX)|(?P<ahead>LA[\d.,]+)"
+    rf"(?P<inc>I?)(?P<axis>[XYZABC]|PR|PA) *(?P<value>{_VALUE})|(?P<side>R[0LR])\b"
+    rf"|F *(?P<feed>MAX|AUTO|{_VALUE})"
+    rf"|DR(?P<way>[+-])|R(?P<radius>{_VALUE})|M(?P<m>\d+)\.?(?!\d)|(?P<limit>MB *MAX)|(?P<ahead>LA[\d.,]+)"
 )
 _HEAD = re.compile(r"\s*(?:\d+(?:\.\d+)?\s+)?")
 _CYCLE = re.compile(r"CYCL DEF (\d+)(?:\.(\d+))?")
@@ -99,7 +100,10 @@ class Translator:
         self._labels: dict[str, str] = {}
         self._ends, self._shortest, self._datum = 0, False, ""
         self._kinds_of_holes = len(set(re.findall(r"CYCL DEF (20[0137])\b", text)))
-        self._called = {found[1] for line in self._lines for found in [_LABEL.match(_code(line)[0])] if found}
+        self._labels_at: dict[str, list[int]] = {}
+        for k, line in enumerate(self._lines):
+            if (found := _LABEL.match(_code(line)[0])) is not None:
+                self._labels_at.setdefault(found[1], []).append(k)
 
     def text(self) -> str:
         """Return the program as a Sinumerik's."""
@@ -170,15 +174,21 @@ class Translator:
             words.append(f"S={self._speed}")
         if found[4] is not None:
             self._feed = _expression(found[4])
+            words.append(f"F={self._feed}")
         return " ".join(words)
 
     def _datum_shift(self, code: str) -> str:
-        words = _SHIFT.findall(code.partition(" ")[2].partition("7.")[2])
+        if code.startswith("CYCL DEF 7.0"):
+            return ""
+        given = code.partition("7.")[2].partition(" ")[2]
+        words = _SHIFT.findall(given)
+        if not words or _SHIFT.sub("", given).strip():
+            raise _RefusedError(r.REASON_SHIFT)
         for incremental, axis, value in words:
-            if incremental or (self._computes and _float(value) != 0.0):
+            if (incremental or self._computes) and _float(value) != 0.0:
                 raise _RefusedError(r.REASON_SHIFT)
-            self._shift[axis] = _expression(value)
-        return "TRANS " + " ".join(f"{axis}={value}" for axis, value in self._shift.items()) if words else ""
+            self._shift[axis] = self._shift[axis] if incremental else _expression(value)
+        return "TRANS " + " ".join(f"{axis}={value}" for axis, value in self._shift.items())
 
     def _datum_preset(self, code: str) -> str:
         number = dict(_Q_WORD.findall(code)).get("339", "")
@@ -193,8 +203,12 @@ class Translator:
         return "NOTED"
 
     def _dwell(self, code: str) -> str:
-        found = re.search(rf"9\.1 .*?({_VALUE})$", code)
-        return f"G4 F{_expression(found[1])}" if found else ""
+        if code.startswith("CYCL DEF 9.0"):
+            return ""
+        found = re.match(rf"CYCL DEF 9\.1 [A-Z. ]*({_VALUE})$", code)
+        if found is None:
+            raise _RefusedError(r.REASON_TNC_WORD)
+        return f"G4 F={_expression(found[1])}"
 
     def _stop(self, code: str) -> str:
         return " ".join(["M0", *self._m_words(_tokens(code.removeprefix("STOP")))])
@@ -238,7 +252,8 @@ class Translator:
 
     def _call_label(self, code: str) -> str:
         found = _CALL.match(code)
-        if found is None or found[1] not in self._called:
+        begin = self._labels_at.get(found[1], []) if found is not None else []
+        if found is None or len(begin) != 1 or (found[2] is not None and begin[0] > self._k):
             raise _RefusedError(r.REASON_TNC_LABEL)
         if found[2] is not None:
             return f"REPEAT {self._label_of(found[1])} P={int(found[2])}"
@@ -510,6 +525,7 @@ def _code(line: str) -> tuple[str, bool]:
     head = _HEAD.match(text)
     code = "" if head is None or re.match(r"\s*\d+\s*$", text) else text[head.end() :]
     code = " ".join(re.sub(r'("[^"]*")|([^"]+)', lambda m: m[1] or m[2].upper(), code).split())
+    code = code.replace("CYCLE DEF", "CYCL DEF")
     return ("" if code.startswith("*") else code), goes_on
 
 
