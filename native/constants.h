@@ -238,6 +238,9 @@
 #define V_CYCLE_REAM 85
 #define V_CYCLE_BORE_STOP 86
 #define V_CYCLE_BORE 89
+#define V_CYCLE_SWIVEL 800
+#define V_CYCLE_BEHIND 1000
+#define V_CYCLE_ARGUMENTS 26
 #define V_PLANE_XY 17
 #define V_PLANE_ZX 18
 #define V_PLANE_YZ 19
@@ -292,6 +295,7 @@
 #define D_TIP_OFF 45
 #define D_OTHER_TIP 34
 #define D_SKIPPED 38
+#define D_LABEL 48
 #define D_SHIFT_SET 61
 #define D_SHIFT_ADD 43
 #define D_CORNER_ROUND 49
@@ -304,6 +308,14 @@
 #define D_TURN_ADD 56
 #define D_TURN_DEG 57
 #define D_TURN_OFF 39
+#define D_MIRROR_SET 1
+#define D_MIRROR_ADD 2
+#define D_MIRROR_OFF 3
+#define D_ARC_VIA 4
+#define D_ARC_TANGENT 5
+#define D_NEXT_VIA 6
+#define D_APPROACH_CONTOUR 7
+#define D_APPROACH_NORMAL 8
 #define D_PROGRAM_NUMBER 58
 #define D_HARMLESS 0
 #define D_REFUSED 1
@@ -322,7 +334,18 @@
 #define D_MODAL_CALL 14
 #define D_TOOL_NAME 15
 #define D_TURN 16
+#define D_DEFINE 17
+#define D_VARIABLE 18
+#define D_NAMED_ARC 19
+#define D_APPROACH 20
 #define D_KIND_STEP 32
+#define D_LEAD_AT_ENTRY 0
+#define D_LEAD_TO_CONTOUR 1
+#define D_LEAD_BY_CORNER 2
+#define D_D_IS_TOOL 0
+#define D_D_IS_RADIUS 1
+#define D_D_IS_DIAMETER 2
+#define D_D_IS_WEAR 3
 #define D_AS_WRITTEN 0
 #define D_POINT_REQUIRED 1
 #define D_THOUSANDTHS 2
@@ -336,9 +359,15 @@
 #define D_CODE_TURN (-6)
 #define D_CODE_TURN_OFF (-7)
 #define D_CODE_OFFSET (-8)
-#define D_CODE_REFUSED (-9)
+#define D_CODE_MIRROR (-9)
+#define D_CODE_MIRROR_OFF (-10)
+#define D_CODE_CORNER_ARC (-11)
+#define D_CODE_CORNER_MEETING (-12)
+#define D_CODE_REFUSED (-13)
 
 /* gcode2krl.gcode.dialects */
+#define DR_FIRST_REAL 100
+#define DR_REASON_TILTED 0
 #define DR_REASON_POLAR 3
 #define DR_REASON_OFFSET 7
 #define DR_REASON_SETTING 13
@@ -364,6 +393,35 @@
 #define DR_REASON_TURN 51
 #define DR_REASON_TURNED 52
 #define DR_REASON_FIRST_TURNED 53
+#define DR_REASON_PECKS 54
+#define DR_REASON_PITCH 55
+#define DR_REASON_MIRROR 56
+#define DR_REASON_NAMED_ARC 57
+#define DR_REASON_LOOK_AHEAD 58
+#define DR_REASON_ENTRY_ARC 59
+#define DR_REASON_LEAD_OUT 60
+#define DR_REASON_D 61
+#define DR_REASON_CORNERS_OF_G41 62
+#define DR_REASON_TOOL_OFFSET 63
+#define DR_REASON_FREE_CONTOUR 64
+#define DR_REASON_TNC_INCHES 65
+#define DR_REASON_TOOL_CALL 66
+#define DR_REASON_TNC_LABEL 67
+#define DR_REASON_TNC_POLE 68
+#define DR_REASON_TNC_ARC 69
+#define DR_REASON_TNC_WORD 70
+#define DR_REASON_TNC_M 71
+#define DR_REASON_HOLE 72
+#define DR_REASON_REAM 73
+#define DR_REASON_BORE 74
+#define DR_REASON_ROTATED 1
+#define DR_REASON_SCALED 2
+#define DR_REASON_BORING 4
+#define DR_REASON_PROBING 5
+#define DR_REASON_CYCLE 8
+#define DR_REASON_SMOOTH 15
+#define DR_REASON_SHIFT 20
+#define DR_FIRST_VARIABLE 100
 #define DR_REASON_EDGE 22
 #define DR_REASON_FLOW 9
 #define DR_REASON_BESIDE 21
@@ -376,7 +434,6 @@
 #define DR_REASON_MOVED 29
 #define DR_DEFAULT "linuxcnc"
 #define DR_OTHER_POST "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
-#define DR_CONVERSATIONAL "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
 
 /* gcode2krl.gcode.findings */
 #define F_OK 0
@@ -523,8 +580,11 @@
 #define FM_RESTORE_LENGTH 267
 
 /* gcode2krl.gcode.state */
+#define S_MM_PER_INCH 25.4
 #define S_ZERO_DROPPED 1
 #define S_ZERO_OFF 2
+#define S_UNREAD_CORNERS 1
+#define S_UNREAD_APPROACH 2
 #define S_CUTTER_ON 1
 #define S_CUTTER_BESIDE 2
 #define S_DOUBT_X 1
@@ -551,6 +611,7 @@
 #define S_NOTE_CODE 7
 #define S_NOTE_STATEMENT 8
 #define S_NOTE_SMALL_ARC 9
+#define S_AT_START (-1)
 #define S_UNKNOWN_GROUP (-1)
 #define S_UNSUPPORTED_GROUP (-2)
 #define S_FIRST_G505 9
@@ -569,6 +630,9 @@
 #define P_MOST_PARAMETERS 5602
 #define P_LOCAL_PARAMETERS 30
 #define P_MOST_R 100
+#define P_FIRST_REAL 100
+#define P_FIRST_INT 2000
+#define P_FIRST_BOOL 4000
 #define P_MACRO_LOCALS 33
 #define P_MACRO_COMMON {100, 199}
 #define P_MACRO_KEPT {500, 999}
@@ -600,6 +664,10 @@
 #define P_KIND_MACRO_IF 19
 #define P_KIND_MACRO_WHILE 20
 #define P_KIND_SIEMENS_IF 21
+#define P_KIND_FOR 22
+#define P_KIND_ENDFOR 23
+#define P_KIND_UNTIL 24
+#define P_KIND_SECTION 25
 
 /* gcode2krl.gcode.program_faults */
 #define PF_NO_VALUE 0
@@ -624,11 +692,16 @@
 #define PF_MACRO_NULL 19
 #define PF_SIEMENS_VALUE 20
 #define PF_SIEMENS_BRACKET 21
-#define PF_SIEMENS_ATAN2 22
+#define PF_SIEMENS_TWO 22
 #define PF_SIEMENS_COMPARISONS 23
 #define PF_SIEMENS_SAME_BLOCK 24
 #define PF_SIEMENS_GOTO 25
 #define PF_NAME_COMMENT 26
+#define PF_SIEMENS_UNDEFINED 27
+#define PF_SIEMENS_DEF 28
+#define PF_SIEMENS_TRUTH 29
+#define PF_SIEMENS_FOR 30
+#define PF_SIEMENS_BEHIND 31
 #define PF_DIVISION_BY_ZERO 0
 #define PF_SQUARE_ROOT 1
 #define PF_LOGARITHM 2
@@ -685,6 +758,11 @@
 #define PF_FAULT_M98_MACRO 28
 #define PF_FAULT_M99_WORDS 29
 #define PF_FAULT_LOCAL 30
+#define PF_FAULT_STRUCTURE 31
+#define PF_FAULT_SECTION 32
+#define PF_FAULT_SECTION_LABEL 33
+#define PF_FAULT_SECTION_TIMES 34
+#define PF_FAULT_FOR_END 35
 
 /* gcode2krl.gcode.parameter_names */
 #define N_LINE 0
@@ -885,6 +963,8 @@ typedef struct {
     int8_t rotated;
     double turned_deg;
     double turned_about_mm[2];
+    int32_t mirrored;
+    int32_t flipped;
     int8_t turned_anew;
     int8_t offsets_taken;
     double home_28[3];
@@ -900,6 +980,8 @@ typedef struct {
     int32_t length_code;
     double feed_word;
     int32_t arcs;
+    double arc_end[2];
+    int64_t arc_end_rows;
     int8_t mist;
     int8_t flood;
     int8_t ended;
@@ -937,6 +1019,10 @@ typedef struct {
     double cutter_radius_mm;
     double cutter_other_mm[2];
     int8_t cutter_entered;
+    int8_t cutter_led;
+    int32_t cutter_idle;
+    int32_t cutter_d;
+    int32_t cutter_unread;
     int8_t cutter_failed;
     double cutter_normal[2];
     int32_t held_turn;
@@ -973,7 +1059,9 @@ typedef struct {
     double cycle_unit_mm;
     int8_t cycle_absolute;
     int32_t modal_call;
-    double modal_mm[4];
+    int32_t modal_arguments;
+    double modal_argument[26];
+    double modal_unit_mm;
 } State;
 typedef char State_x_stands_at_0[offsetof(State, x) == 0 ? 1 : -1];
 typedef char State_y_stands_at_8[offsetof(State, y) == 8 ? 1 : -1];
@@ -1012,96 +1100,106 @@ typedef char State_rotation_sin_stands_at_248[offsetof(State, rotation_sin) == 2
 typedef char State_rotated_stands_at_256[offsetof(State, rotated) == 256 ? 1 : -1];
 typedef char State_turned_deg_stands_at_264[offsetof(State, turned_deg) == 264 ? 1 : -1];
 typedef char State_turned_about_mm_stands_at_272[offsetof(State, turned_about_mm) == 272 ? 1 : -1];
-typedef char State_turned_anew_stands_at_288[offsetof(State, turned_anew) == 288 ? 1 : -1];
-typedef char State_offsets_taken_stands_at_289[offsetof(State, offsets_taken) == 289 ? 1 : -1];
-typedef char State_home_28_stands_at_296[offsetof(State, home_28) == 296 ? 1 : -1];
-typedef char State_home_30_stands_at_320[offsetof(State, home_30) == 320 ? 1 : -1];
-typedef char State_rotary_deg_stands_at_344[offsetof(State, rotary_deg) == 344 ? 1 : -1];
-typedef char State_rotary_unknown_stands_at_368[offsetof(State, rotary_unknown) == 368 ? 1 : -1];
-typedef char State_home_28_deg_stands_at_376[offsetof(State, home_28_deg) == 376 ? 1 : -1];
-typedef char State_home_30_deg_stands_at_400[offsetof(State, home_30_deg) == 400 ? 1 : -1];
-typedef char State_tool_vector_stands_at_424[offsetof(State, tool_vector) == 424 ? 1 : -1];
-typedef char State_has_vector_stands_at_448[offsetof(State, has_vector) == 448 ? 1 : -1];
-typedef char State_traori_stands_at_449[offsetof(State, traori) == 449 ? 1 : -1];
-typedef char State_zero_in_doubt_stands_at_450[offsetof(State, zero_in_doubt) == 450 ? 1 : -1];
-typedef char State_length_code_stands_at_452[offsetof(State, length_code) == 452 ? 1 : -1];
-typedef char State_feed_word_stands_at_456[offsetof(State, feed_word) == 456 ? 1 : -1];
-typedef char State_arcs_stands_at_464[offsetof(State, arcs) == 464 ? 1 : -1];
-typedef char State_mist_stands_at_468[offsetof(State, mist) == 468 ? 1 : -1];
-typedef char State_flood_stands_at_469[offsetof(State, flood) == 469 ? 1 : -1];
-typedef char State_ended_stands_at_470[offsetof(State, ended) == 470 ? 1 : -1];
-typedef char State_end_line_stands_at_472[offsetof(State, end_line) == 472 ? 1 : -1];
-typedef char State_tape_marks_stands_at_476[offsetof(State, tape_marks) == 476 ? 1 : -1];
-typedef char State_unit_named_stands_at_480[offsetof(State, unit_named) == 480 ? 1 : -1];
-typedef char State_blocks_stands_at_488[offsetof(State, blocks) == 488 ? 1 : -1];
-typedef char State_level_stands_at_496[offsetof(State, level) == 496 ? 1 : -1];
-typedef char State_largest_mm_stands_at_504[offsetof(State, largest_mm) == 504 ? 1 : -1];
-typedef char State_unknown_feed_line_stands_at_512[offsetof(State, unknown_feed_line) == 512 ? 1 : -1];
-typedef char State_unknown_reported_stands_at_516[offsetof(State, unknown_reported) == 516 ? 1 : -1];
-typedef char State_doubt_stands_at_520[offsetof(State, doubt) == 520 ? 1 : -1];
-typedef char State_motion_line_stands_at_524[offsetof(State, motion_line) == 524 ? 1 : -1];
-typedef char State_distance_line_stands_at_528[offsetof(State, distance_line) == 528 ? 1 : -1];
-typedef char State_distance_unnamed_line_stands_at_532[offsetof(State, distance_unnamed_line) == 532 ? 1 : -1];
-typedef char State_feed_mode_line_stands_at_536[offsetof(State, feed_mode_line) == 536 ? 1 : -1];
-typedef char State_rotary_refused_stands_at_540[offsetof(State, rotary_refused) == 540 ? 1 : -1];
-typedef char State_note_count_stands_at_544[offsetof(State, note_count) == 544 ? 1 : -1];
-typedef char State_note_line_stands_at_584[offsetof(State, note_line) == 584 ? 1 : -1];
-typedef char State_note_word_stands_at_624[offsetof(State, note_word) == 624 ? 1 : -1];
-typedef char State_moved_mm_stands_at_664[offsetof(State, moved_mm) == 664 ? 1 : -1];
-typedef char State_misfits_stands_at_736[offsetof(State, misfits) == 736 ? 1 : -1];
-typedef char State_misfits_other_centre_stands_at_740[offsetof(State, misfits_other_centre) == 740 ? 1 : -1];
-typedef char State_misfits_reversed_stands_at_744[offsetof(State, misfits_reversed) == 744 ? 1 : -1];
-typedef char State_misfits_exchanged_stands_at_748[offsetof(State, misfits_exchanged) == 748 ? 1 : -1];
-typedef char State_spirals_stands_at_752[offsetof(State, spirals) == 752 ? 1 : -1];
-typedef char State_spiral_line_stands_at_756[offsetof(State, spiral_line) == 756 ? 1 : -1];
-typedef char State_spiral_start_stands_at_760[offsetof(State, spiral_start) == 760 ? 1 : -1];
-typedef char State_spiral_end_stands_at_768[offsetof(State, spiral_end) == 768 ? 1 : -1];
-typedef char State_spiral_unit_mm_stands_at_776[offsetof(State, spiral_unit_mm) == 776 ? 1 : -1];
-typedef char State_cutter_mode_stands_at_784[offsetof(State, cutter_mode) == 784 ? 1 : -1];
-typedef char State_cutter_side_stands_at_788[offsetof(State, cutter_side) == 788 ? 1 : -1];
-typedef char State_cutter_code_stands_at_792[offsetof(State, cutter_code) == 792 ? 1 : -1];
-typedef char State_cutter_line_stands_at_796[offsetof(State, cutter_line) == 796 ? 1 : -1];
-typedef char State_cutter_radius_mm_stands_at_800[offsetof(State, cutter_radius_mm) == 800 ? 1 : -1];
-typedef char State_cutter_other_mm_stands_at_808[offsetof(State, cutter_other_mm) == 808 ? 1 : -1];
-typedef char State_cutter_entered_stands_at_824[offsetof(State, cutter_entered) == 824 ? 1 : -1];
-typedef char State_cutter_failed_stands_at_825[offsetof(State, cutter_failed) == 825 ? 1 : -1];
-typedef char State_cutter_normal_stands_at_832[offsetof(State, cutter_normal) == 832 ? 1 : -1];
-typedef char State_held_turn_stands_at_848[offsetof(State, held_turn) == 848 ? 1 : -1];
-typedef char State_held_line_stands_at_852[offsetof(State, held_line) == 852 ? 1 : -1];
-typedef char State_held_from_stands_at_856[offsetof(State, held_from) == 856 ? 1 : -1];
-typedef char State_held_along_stands_at_872[offsetof(State, held_along) == 872 ? 1 : -1];
-typedef char State_held_centre_stands_at_888[offsetof(State, held_centre) == 888 ? 1 : -1];
-typedef char State_held_w_stands_at_904[offsetof(State, held_w) == 904 ? 1 : -1];
-typedef char State_held_sweep_stands_at_920[offsetof(State, held_sweep) == 920 ? 1 : -1];
-typedef char State_held_rows_stands_at_928[offsetof(State, held_rows) == 928 ? 1 : -1];
-typedef char State_cutter_rows_removed_stands_at_944[offsetof(State, cutter_rows_removed) == 944 ? 1 : -1];
-typedef char State_held_events_stands_at_952[offsetof(State, held_events) == 952 ? 1 : -1];
-typedef char State_corner_stands_at_960[offsetof(State, corner) == 960 ? 1 : -1];
-typedef char State_corner_line_stands_at_964[offsetof(State, corner_line) == 964 ? 1 : -1];
-typedef char State_corner_mm_stands_at_968[offsetof(State, corner_mm) == 968 ? 1 : -1];
-typedef char State_corner_from_mm_stands_at_976[offsetof(State, corner_from_mm) == 976 ? 1 : -1];
-typedef char State_corner_mm_s_stands_at_1000[offsetof(State, corner_mm_s) == 1000 ? 1 : -1];
-typedef char State_corner_rows_stands_at_1008[offsetof(State, corner_rows) == 1008 ? 1 : -1];
-typedef char State_corner_events_stands_at_1016[offsetof(State, corner_events) == 1016 ? 1 : -1];
-typedef char State_retract_stands_at_1024[offsetof(State, retract) == 1024 ? 1 : -1];
-typedef char State_retract_line_stands_at_1028[offsetof(State, retract_line) == 1028 ? 1 : -1];
-typedef char State_unset_parameter_stands_at_1032[offsetof(State, unset_parameter) == 1032 ? 1 : -1];
-typedef char State_unset_line_stands_at_1036[offsetof(State, unset_line) == 1036 ? 1 : -1];
-typedef char State_retract_unnamed_line_stands_at_1040[offsetof(State, retract_unnamed_line) == 1040 ? 1 : -1];
-typedef char State_in_cycles_stands_at_1044[offsetof(State, in_cycles) == 1044 ? 1 : -1];
-typedef char State_cycle_level_mm_stands_at_1048[offsetof(State, cycle_level_mm) == 1048 ? 1 : -1];
-typedef char State_cycle_level_known_stands_at_1056[offsetof(State, cycle_level_known) == 1056 ? 1 : -1];
-typedef char State_cycle_r_stands_at_1064[offsetof(State, cycle_r) == 1064 ? 1 : -1];
-typedef char State_cycle_depth_stands_at_1072[offsetof(State, cycle_depth) == 1072 ? 1 : -1];
-typedef char State_cycle_q_stands_at_1080[offsetof(State, cycle_q) == 1080 ? 1 : -1];
-typedef char State_cycle_p_stands_at_1088[offsetof(State, cycle_p) == 1088 ? 1 : -1];
-typedef char State_cycle_line_stands_at_1096[offsetof(State, cycle_line) == 1096 ? 1 : -1];
-typedef char State_cycle_plane_stands_at_1100[offsetof(State, cycle_plane) == 1100 ? 1 : -1];
-typedef char State_cycle_unit_mm_stands_at_1104[offsetof(State, cycle_unit_mm) == 1104 ? 1 : -1];
-typedef char State_cycle_absolute_stands_at_1112[offsetof(State, cycle_absolute) == 1112 ? 1 : -1];
-typedef char State_modal_call_stands_at_1116[offsetof(State, modal_call) == 1116 ? 1 : -1];
-typedef char State_modal_mm_stands_at_1120[offsetof(State, modal_mm) == 1120 ? 1 : -1];
-typedef char State_has_its_size[sizeof(State) == 1152 ? 1 : -1];
+typedef char State_mirrored_stands_at_288[offsetof(State, mirrored) == 288 ? 1 : -1];
+typedef char State_flipped_stands_at_292[offsetof(State, flipped) == 292 ? 1 : -1];
+typedef char State_turned_anew_stands_at_296[offsetof(State, turned_anew) == 296 ? 1 : -1];
+typedef char State_offsets_taken_stands_at_297[offsetof(State, offsets_taken) == 297 ? 1 : -1];
+typedef char State_home_28_stands_at_304[offsetof(State, home_28) == 304 ? 1 : -1];
+typedef char State_home_30_stands_at_328[offsetof(State, home_30) == 328 ? 1 : -1];
+typedef char State_rotary_deg_stands_at_352[offsetof(State, rotary_deg) == 352 ? 1 : -1];
+typedef char State_rotary_unknown_stands_at_376[offsetof(State, rotary_unknown) == 376 ? 1 : -1];
+typedef char State_home_28_deg_stands_at_384[offsetof(State, home_28_deg) == 384 ? 1 : -1];
+typedef char State_home_30_deg_stands_at_408[offsetof(State, home_30_deg) == 408 ? 1 : -1];
+typedef char State_tool_vector_stands_at_432[offsetof(State, tool_vector) == 432 ? 1 : -1];
+typedef char State_has_vector_stands_at_456[offsetof(State, has_vector) == 456 ? 1 : -1];
+typedef char State_traori_stands_at_457[offsetof(State, traori) == 457 ? 1 : -1];
+typedef char State_zero_in_doubt_stands_at_458[offsetof(State, zero_in_doubt) == 458 ? 1 : -1];
+typedef char State_length_code_stands_at_460[offsetof(State, length_code) == 460 ? 1 : -1];
+typedef char State_feed_word_stands_at_464[offsetof(State, feed_word) == 464 ? 1 : -1];
+typedef char State_arcs_stands_at_472[offsetof(State, arcs) == 472 ? 1 : -1];
+typedef char State_arc_end_stands_at_480[offsetof(State, arc_end) == 480 ? 1 : -1];
+typedef char State_arc_end_rows_stands_at_496[offsetof(State, arc_end_rows) == 496 ? 1 : -1];
+typedef char State_mist_stands_at_504[offsetof(State, mist) == 504 ? 1 : -1];
+typedef char State_flood_stands_at_505[offsetof(State, flood) == 505 ? 1 : -1];
+typedef char State_ended_stands_at_506[offsetof(State, ended) == 506 ? 1 : -1];
+typedef char State_end_line_stands_at_508[offsetof(State, end_line) == 508 ? 1 : -1];
+typedef char State_tape_marks_stands_at_512[offsetof(State, tape_marks) == 512 ? 1 : -1];
+typedef char State_unit_named_stands_at_516[offsetof(State, unit_named) == 516 ? 1 : -1];
+typedef char State_blocks_stands_at_520[offsetof(State, blocks) == 520 ? 1 : -1];
+typedef char State_level_stands_at_528[offsetof(State, level) == 528 ? 1 : -1];
+typedef char State_largest_mm_stands_at_536[offsetof(State, largest_mm) == 536 ? 1 : -1];
+typedef char State_unknown_feed_line_stands_at_544[offsetof(State, unknown_feed_line) == 544 ? 1 : -1];
+typedef char State_unknown_reported_stands_at_548[offsetof(State, unknown_reported) == 548 ? 1 : -1];
+typedef char State_doubt_stands_at_552[offsetof(State, doubt) == 552 ? 1 : -1];
+typedef char State_motion_line_stands_at_556[offsetof(State, motion_line) == 556 ? 1 : -1];
+typedef char State_distance_line_stands_at_560[offsetof(State, distance_line) == 560 ? 1 : -1];
+typedef char State_distance_unnamed_line_stands_at_564[offsetof(State, distance_unnamed_line) == 564 ? 1 : -1];
+typedef char State_feed_mode_line_stands_at_568[offsetof(State, feed_mode_line) == 568 ? 1 : -1];
+typedef char State_rotary_refused_stands_at_572[offsetof(State, rotary_refused) == 572 ? 1 : -1];
+typedef char State_note_count_stands_at_576[offsetof(State, note_count) == 576 ? 1 : -1];
+typedef char State_note_line_stands_at_616[offsetof(State, note_line) == 616 ? 1 : -1];
+typedef char State_note_word_stands_at_656[offsetof(State, note_word) == 656 ? 1 : -1];
+typedef char State_moved_mm_stands_at_696[offsetof(State, moved_mm) == 696 ? 1 : -1];
+typedef char State_misfits_stands_at_768[offsetof(State, misfits) == 768 ? 1 : -1];
+typedef char State_misfits_other_centre_stands_at_772[offsetof(State, misfits_other_centre) == 772 ? 1 : -1];
+typedef char State_misfits_reversed_stands_at_776[offsetof(State, misfits_reversed) == 776 ? 1 : -1];
+typedef char State_misfits_exchanged_stands_at_780[offsetof(State, misfits_exchanged) == 780 ? 1 : -1];
+typedef char State_spirals_stands_at_784[offsetof(State, spirals) == 784 ? 1 : -1];
+typedef char State_spiral_line_stands_at_788[offsetof(State, spiral_line) == 788 ? 1 : -1];
+typedef char State_spiral_start_stands_at_792[offsetof(State, spiral_start) == 792 ? 1 : -1];
+typedef char State_spiral_end_stands_at_800[offsetof(State, spiral_end) == 800 ? 1 : -1];
+typedef char State_spiral_unit_mm_stands_at_808[offsetof(State, spiral_unit_mm) == 808 ? 1 : -1];
+typedef char State_cutter_mode_stands_at_816[offsetof(State, cutter_mode) == 816 ? 1 : -1];
+typedef char State_cutter_side_stands_at_820[offsetof(State, cutter_side) == 820 ? 1 : -1];
+typedef char State_cutter_code_stands_at_824[offsetof(State, cutter_code) == 824 ? 1 : -1];
+typedef char State_cutter_line_stands_at_828[offsetof(State, cutter_line) == 828 ? 1 : -1];
+typedef char State_cutter_radius_mm_stands_at_832[offsetof(State, cutter_radius_mm) == 832 ? 1 : -1];
+typedef char State_cutter_other_mm_stands_at_840[offsetof(State, cutter_other_mm) == 840 ? 1 : -1];
+typedef char State_cutter_entered_stands_at_856[offsetof(State, cutter_entered) == 856 ? 1 : -1];
+typedef char State_cutter_led_stands_at_857[offsetof(State, cutter_led) == 857 ? 1 : -1];
+typedef char State_cutter_idle_stands_at_860[offsetof(State, cutter_idle) == 860 ? 1 : -1];
+typedef char State_cutter_d_stands_at_864[offsetof(State, cutter_d) == 864 ? 1 : -1];
+typedef char State_cutter_unread_stands_at_868[offsetof(State, cutter_unread) == 868 ? 1 : -1];
+typedef char State_cutter_failed_stands_at_872[offsetof(State, cutter_failed) == 872 ? 1 : -1];
+typedef char State_cutter_normal_stands_at_880[offsetof(State, cutter_normal) == 880 ? 1 : -1];
+typedef char State_held_turn_stands_at_896[offsetof(State, held_turn) == 896 ? 1 : -1];
+typedef char State_held_line_stands_at_900[offsetof(State, held_line) == 900 ? 1 : -1];
+typedef char State_held_from_stands_at_904[offsetof(State, held_from) == 904 ? 1 : -1];
+typedef char State_held_along_stands_at_920[offsetof(State, held_along) == 920 ? 1 : -1];
+typedef char State_held_centre_stands_at_936[offsetof(State, held_centre) == 936 ? 1 : -1];
+typedef char State_held_w_stands_at_952[offsetof(State, held_w) == 952 ? 1 : -1];
+typedef char State_held_sweep_stands_at_968[offsetof(State, held_sweep) == 968 ? 1 : -1];
+typedef char State_held_rows_stands_at_976[offsetof(State, held_rows) == 976 ? 1 : -1];
+typedef char State_cutter_rows_removed_stands_at_992[offsetof(State, cutter_rows_removed) == 992 ? 1 : -1];
+typedef char State_held_events_stands_at_1000[offsetof(State, held_events) == 1000 ? 1 : -1];
+typedef char State_corner_stands_at_1008[offsetof(State, corner) == 1008 ? 1 : -1];
+typedef char State_corner_line_stands_at_1012[offsetof(State, corner_line) == 1012 ? 1 : -1];
+typedef char State_corner_mm_stands_at_1016[offsetof(State, corner_mm) == 1016 ? 1 : -1];
+typedef char State_corner_from_mm_stands_at_1024[offsetof(State, corner_from_mm) == 1024 ? 1 : -1];
+typedef char State_corner_mm_s_stands_at_1048[offsetof(State, corner_mm_s) == 1048 ? 1 : -1];
+typedef char State_corner_rows_stands_at_1056[offsetof(State, corner_rows) == 1056 ? 1 : -1];
+typedef char State_corner_events_stands_at_1064[offsetof(State, corner_events) == 1064 ? 1 : -1];
+typedef char State_retract_stands_at_1072[offsetof(State, retract) == 1072 ? 1 : -1];
+typedef char State_retract_line_stands_at_1076[offsetof(State, retract_line) == 1076 ? 1 : -1];
+typedef char State_unset_parameter_stands_at_1080[offsetof(State, unset_parameter) == 1080 ? 1 : -1];
+typedef char State_unset_line_stands_at_1084[offsetof(State, unset_line) == 1084 ? 1 : -1];
+typedef char State_retract_unnamed_line_stands_at_1088[offsetof(State, retract_unnamed_line) == 1088 ? 1 : -1];
+typedef char State_in_cycles_stands_at_1092[offsetof(State, in_cycles) == 1092 ? 1 : -1];
+typedef char State_cycle_level_mm_stands_at_1096[offsetof(State, cycle_level_mm) == 1096 ? 1 : -1];
+typedef char State_cycle_level_known_stands_at_1104[offsetof(State, cycle_level_known) == 1104 ? 1 : -1];
+typedef char State_cycle_r_stands_at_1112[offsetof(State, cycle_r) == 1112 ? 1 : -1];
+typedef char State_cycle_depth_stands_at_1120[offsetof(State, cycle_depth) == 1120 ? 1 : -1];
+typedef char State_cycle_q_stands_at_1128[offsetof(State, cycle_q) == 1128 ? 1 : -1];
+typedef char State_cycle_p_stands_at_1136[offsetof(State, cycle_p) == 1136 ? 1 : -1];
+typedef char State_cycle_line_stands_at_1144[offsetof(State, cycle_line) == 1144 ? 1 : -1];
+typedef char State_cycle_plane_stands_at_1148[offsetof(State, cycle_plane) == 1148 ? 1 : -1];
+typedef char State_cycle_unit_mm_stands_at_1152[offsetof(State, cycle_unit_mm) == 1152 ? 1 : -1];
+typedef char State_cycle_absolute_stands_at_1160[offsetof(State, cycle_absolute) == 1160 ? 1 : -1];
+typedef char State_modal_call_stands_at_1164[offsetof(State, modal_call) == 1164 ? 1 : -1];
+typedef char State_modal_arguments_stands_at_1168[offsetof(State, modal_arguments) == 1168 ? 1 : -1];
+typedef char State_modal_argument_stands_at_1176[offsetof(State, modal_argument) == 1176 ? 1 : -1];
+typedef char State_modal_unit_mm_stands_at_1384[offsetof(State, modal_unit_mm) == 1384 ? 1 : -1];
+typedef char State_has_its_size[sizeof(State) == 1392 ? 1 : -1];
 VIEW(StateView, State);
 
 typedef struct {
@@ -1284,6 +1382,7 @@ typedef struct {
     int64_t times;
     int64_t generation;
     int64_t entry;
+    int64_t until;
     int32_t is_program;
     int32_t has_arguments;
     int32_t main_line;
@@ -1298,16 +1397,17 @@ typedef char Frame_return_to_stands_at_0[offsetof(Frame, return_to) == 0 ? 1 : -
 typedef char Frame_times_stands_at_8[offsetof(Frame, times) == 8 ? 1 : -1];
 typedef char Frame_generation_stands_at_16[offsetof(Frame, generation) == 16 ? 1 : -1];
 typedef char Frame_entry_stands_at_24[offsetof(Frame, entry) == 24 ? 1 : -1];
-typedef char Frame_is_program_stands_at_32[offsetof(Frame, is_program) == 32 ? 1 : -1];
-typedef char Frame_has_arguments_stands_at_36[offsetof(Frame, has_arguments) == 36 ? 1 : -1];
-typedef char Frame_main_line_stands_at_40[offsetof(Frame, main_line) == 40 ? 1 : -1];
-typedef char Frame_repeats_stands_at_44[offsetof(Frame, repeats) == 44 ? 1 : -1];
-typedef char Frame_given_stands_at_48[offsetof(Frame, given) == 48 ? 1 : -1];
-typedef char Frame_assigned_stands_at_56[offsetof(Frame, assigned) == 56 ? 1 : -1];
-typedef char Frame_subprogram_stands_at_64[offsetof(Frame, subprogram) == 64 ? 1 : -1];
-typedef char Frame_call_line_stands_at_68[offsetof(Frame, call_line) == 68 ? 1 : -1];
-typedef char Frame_parameters_stands_at_72[offsetof(Frame, parameters) == 72 ? 1 : -1];
-typedef char Frame_has_its_size[sizeof(Frame) == 336 ? 1 : -1];
+typedef char Frame_until_stands_at_32[offsetof(Frame, until) == 32 ? 1 : -1];
+typedef char Frame_is_program_stands_at_40[offsetof(Frame, is_program) == 40 ? 1 : -1];
+typedef char Frame_has_arguments_stands_at_44[offsetof(Frame, has_arguments) == 44 ? 1 : -1];
+typedef char Frame_main_line_stands_at_48[offsetof(Frame, main_line) == 48 ? 1 : -1];
+typedef char Frame_repeats_stands_at_52[offsetof(Frame, repeats) == 52 ? 1 : -1];
+typedef char Frame_given_stands_at_56[offsetof(Frame, given) == 56 ? 1 : -1];
+typedef char Frame_assigned_stands_at_64[offsetof(Frame, assigned) == 64 ? 1 : -1];
+typedef char Frame_subprogram_stands_at_72[offsetof(Frame, subprogram) == 72 ? 1 : -1];
+typedef char Frame_call_line_stands_at_76[offsetof(Frame, call_line) == 76 ? 1 : -1];
+typedef char Frame_parameters_stands_at_80[offsetof(Frame, parameters) == 80 ? 1 : -1];
+typedef char Frame_has_its_size[sizeof(Frame) == 344 ? 1 : -1];
 VIEW(FrameView, Frame);
 
 typedef struct {
@@ -1456,6 +1556,9 @@ typedef struct {
     Floats tool_length_mm;
     Floats tool_diameter_mm;
     Floats cutter_diameter_mm;
+    int64_t lead;
+    int64_t square_corners;
+    int64_t d_holds;
     int64_t programs;
     int64_t has_m61_to_m73;
     int64_t mounted_tool;

@@ -6,8 +6,16 @@ from typing import Final
 ENDINGS: Final = frozenset(
     [".nc", ".ngc", ".ncc", ".cnc", ".tap", ".gcode", ".gc", ".mpf", ".eia", ".min", ".iso", ".h"]
 )
-"""Endings of programs; ``.h`` is Heidenhain's plain text, which is refused with a sentence of its own."""
-DIALECT_NAMES: Final = ("linuxcnc", "fanuc", "fanuc-calculator", "fanuc-increments", "grbl", "sinumerik")
+"""Endings of programs; ``.h`` is Heidenhain's conversational text."""
+DIALECT_NAMES: Final = (
+    "linuxcnc",
+    "fanuc",
+    "fanuc-calculator",
+    "fanuc-increments",
+    "grbl",
+    "sinumerik",
+    "heidenhain",
+)
 """Dialects of G-code, the default first; what they are says `gcode.dialects`."""
 PACKED_ENDING: Final = ".gz"
 _TIMES_PACKED = 10

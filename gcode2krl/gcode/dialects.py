@@ -8,7 +8,7 @@ what a control does depends on its parameters, or is in doubt, the block is refu
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,12 +19,13 @@ from gcode2krl.errors import input_error
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.gcode.program_tables import FIRST_REAL
 
 _CAM = "let the CAM post write G0, G1, G2 and G3 in the part's frame"
 REASONS: Final = (
     ("tilted working plane", f"{_CAM}: output without 3+2 cycles"),
     ("rotated coordinates", _CAM),
-    ("scaling or mirroring", _CAM),
+    ("scaling", _CAM),
     ("polar coordinates", _CAM),
     ("fine boring and back boring move the tool sideways in the hole", "mill the hole, or bore with G85"),
     ("probing or a skip signal is not a motion this program can make", "probe on the controller"),
@@ -63,7 +64,11 @@ REASONS: Final = (
         "remove the block; state them in [work_offsets] and [tool.N] of the cell",
     ),
     ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
-    ("how this control leads in and out is not known", "let the post write the path of the tool's centre"),
+    (
+        "how this control leads in and out, and what D holds, are parameters of the control",
+        'state lead_in = "a" or "b" and d = "radius", "diameter" or "wear" in [program.cutter] of the cell,'
+        " or let the post write the path of the tool's centre",
+    ),
     (
         "the spindle stands still, so its turns take no time",
         "start the spindle, or write G4 F in seconds",
@@ -114,8 +119,8 @@ REASONS: Final = (
     ),
     ("a cycle, and MCALL, stand in a block of their own", "give it a block of its own"),
     (
-        "of CYCLE81 and CYCLE82 are read RTP at or above RFP plus SDIS, one depth, DP or DPR, below RFP, and"
-        " a dwell in seconds; the further numbers say nothing else (0; 10 for the way to count)",
+        "of a drilling cycle are read RTP at or above RFP plus SDIS, one depth, DP or DPR, below RFP, a dwell"
+        " of a spindle that turns or in seconds, and modes that name G17, the tip and these",
         "write CYCLE81(RTP,RFP,SDIS,DP), or let the post write the cycle out in G0 and G1",
     ),
     (
@@ -129,19 +134,108 @@ REASONS: Final = (
         _CAM,
     ),
     (
-        "while the coordinates are rotated the zero stays",
-        "end the rotation before it (G69, ROT), or write it first",
+        "while the coordinates are rotated or mirrored the zero and the plane stay",
+        "end it before this block (G69, G50.1; ROT, MIRROR), or write this block first",
     ),
     (
-        "behind G68 and G69 the first move across the tool names X and Y under G90",
+        "behind G68, G69, G51.1 and G50.1 the first move across the tool names X and Y under G90",
         "write both coordinates in it",
+    ),
+    (
+        "of CYCLE83 are read one first depth, FDEP or FDPR, not below the last, DAM as a length, FRF up to 1,"
+        " VARI 0 or 1, and the tool's axis of G17",
+        "write CYCLE83(RTP,RFP,SDIS,DP,,,FDPR,0,0,0,1,1), or let the post write the cycle out in G0 and G1",
+    ),
+    (
+        "of CYCLE84 are read the pitch PIT in mm, the speed SST and what the spindle does then, SDAC 3 to 5,"
+        " in one cut",
+        "write CYCLE84(RTP,RFP,SDIS,DP,,,5,,PIT,,SST), or mill the thread",
+    ),
+    (
+        "mirroring is read in G17, of X and Y: MIRROR X0, AMIRROR Y0, G51.1 X10. in a block of its own, where"
+        " the program has not mirrored before",
+        _CAM,
+    ),
+    (
+        "an arc by a point on it has both coordinates of it (CIP X Y I1= J1=), off the chord and at its "
+        "height; one"
+        " that touches what leads to it (CT) stands behind a move in the plane that it leaves at an angle, "
+        "without"
+        " G41 and rotations",
+        "let the post write G2 and G3",
+    ),
+    (
+        "between two moves of a compensated contour stand blocks without a move in its plane, and how many "
+        "the"
+        " control looks past to see the corner is a parameter",
+        "write them before or behind the contour",
+    ),
+    (
+        "compensation begins with an arc, which is an alarm on this control",
+        "lead in with G1",
+    ),
+    (
+        "behind G40 the first move leads along the tool, and where the control then takes the offset off is "
+        "not sure",
+        "move in X or Y first, away from the contour",
+    ),
+    (
+        "D names another offset than that of the tool in the spindle, or none was named",
+        "write D with the tool's number; D0 for no compensation",
+    ),
+    (
+        "G451 and KONT decide how a compensated contour is led to and around corners",
+        "write NORM and G450, which are the start-up settings",
+    ),
+    (
+        "G10 L10 to L13 set what the cell states: R has to be length (L10) and size (L12) of the tool P "
+        "there, 0 as"
+        " wear (L11, L13), under G90, with d in [program.cutter]",
+        "remove the block, or correct [tool.N] of the cell",
+    ),
+    ("a contour of free programming (FK)", "let the post write L, C, CR and CT"),
+    (
+        "whether F is in inches or tenths of them a minute is not sure",
+        "let the post write mm: BEGIN PGM … MM",
+    ),
+    (
+        "of TOOL CALL are read the tool, the axis Z, S and F, and DL and DR of 0",
+        "state lengths and diameters in [tool.N] of the cell",
+    ),
+    (
+        "a label that is called stands once in the program, and a called subprogram ends with LBL 0",
+        "add LBL 0",
+    ),
+    (
+        "the pole CC is read with absolute X and Y before what counts from it; LP with PR and PA, a part of "
+        "a turn where"
+        " the tool's place is known",
+        "let the post write X and Y",
+    ),
+    (
+        "of arcs are read C with X, Y and DR, CR with R and DR, CT, CP with PA or IPA of the sign of DR",
+        "let the post write them so",
+    ),
+    ("a word that is not read in this block", "check the word, or let the post write another"),
+    ("this M-code changes how the control moves", "let the post leave it out, or write what it stands for"),
+    (
+        "of drilling cycles are read 200, 201, 203 without Q212 and Q213 and out at FMAX or in one stroke, "
+        "207 behind"
+        " a TOOL CALL with S, with Q200 to Q206 stated, defined before the call",
+        "let the post write L, or cycle 200 with its Q words",
+    ),
+    ("of CYCLE85 are read both feeds, FFR in and RFF out, under G94", "write both feeds"),
+    (
+        "of CYCLE86 is read SDIR 3 or 4 without RPA, RPO and RPAP: no robot's spindle stops at an angle, by"
+        " which the tool could be moved aside in the hole",
+        "write CYCLE86(RTP,RFP,SDIS,DP,,0,3), or mill the hole",
     ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
 _VALUES, _VECTORS, _JOG, _SETTING, _ANGLE, _SMOOTH, _SPLINE, _TOOL_NAME, _RETURN = range(10, 19)
 _HOME, _SHIFT, _BESIDE, _EDGE = range(19, 23)
-REASON_POLAR, REASON_OFFSET = _POLAR, _OFFSETS
+REASON_TILTED, REASON_POLAR, REASON_OFFSET = _TILTED, _POLAR, _OFFSETS
 REASON_SETTING, REASON_JOG, REASON_TOOL_NAME, REASON_VALUES = _SETTING, _JOG, _TOOL_NAME, _VALUES
 _PROGRAM, _NUMBERS, _INCHES, _LEAD, _STILL, _TWICE, _MOVED, _NO_UNIT = range(23, 31)
 _MESSAGE, _SHIFT_BESIDE, _MODAL_CALL = 31, 32, 33
@@ -151,6 +245,13 @@ REASON_PARENTHESES, REASON_SEMICOLON = 41, 42
 REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 _CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZERO = range(46, 51)
 REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
+REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_LOOK_AHEAD = range(54, 59)
+REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_CORNERS_OF_G41, REASON_TOOL_OFFSET = range(59, 64)
+REASON_FREE_CONTOUR, REASON_TNC_INCHES, REASON_TOOL_CALL, REASON_TNC_LABEL, REASON_TNC_POLE = range(64, 69)
+REASON_TNC_ARC, REASON_TNC_WORD, REASON_TNC_M, REASON_HOLE, REASON_REAM, REASON_BORE = range(69, 75)
+REASON_ROTATED, REASON_SCALED, REASON_BORING, REASON_PROBING = _ROTATED, _SCALED, _BORING, _PROBING
+REASON_CYCLE, REASON_SMOOTH, REASON_SHIFT = _CYCLE, _SMOOTH, _SHIFT
+FIRST_VARIABLE = FIRST_REAL
 REASON_EDGE, REASON_FLOW, REASON_BESIDE, REASON_VECTORS = _EDGE, _FLOW, _BESIDE, _VECTORS
 REASON_SHIFT_BESIDE, REASON_MESSAGE = _SHIFT_BESIDE, _MESSAGE
 REASON_PROGRAM, REASON_STILL, REASON_TWICE, REASON_MOVED = _PROGRAM, _STILL, _TWICE, _MOVED
@@ -181,6 +282,12 @@ class Dialect:
     turn: tuple[float, ...] = ()
     """G numbers that rotate the coordinates about a point, and those that end it."""
     turn_off: tuple[float, ...] = ()
+    mirror: tuple[float, ...] = ()
+    """G numbers that mirror axes at a point, and those that end it."""
+    mirror_off: tuple[float, ...] = ()
+    corner_arc: tuple[float, ...] = ()
+    """G numbers that lead around corners of a compensated contour by an arc, and to where its sides meet."""
+    corner_meeting: tuple[float, ...] = ()
     harmless: tuple[float, ...] = ()
     """G numbers that say nothing to this robot."""
     calls: tuple[float, ...] = ()
@@ -204,10 +311,20 @@ class Dialect:
     """Letters that say nothing to what is read of this control: D, which G41 and G42 alone use."""
     length_by_d: bool = False
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
+    lead: int = d.LEAD_AT_ENTRY
+    """How G41 and G42 lead in, of `dialect_marks`."""
+    square_corners: bool = False
+    """Outside corners of a compensated contour are straight moves."""
+    d_holds: int = d.D_IS_TOOL
+    """What D of G41 and G42 says, of `dialect_marks`."""
     start: Mapping[str, float] = field(default_factory=dict)
     """State at the start, where it is stated by the control."""
+    is_conversational: bool = False
+    """Its text is translated into that of a Sinumerik before it is read (`heidenhain`)."""
     tool_names: Mapping[str, int] = field(default_factory=dict)
     """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
+    variables: Mapping[str, int] = field(default_factory=dict)
+    """Numbers, as parameters, of the variables that the program defines, by their names in capitals."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -226,6 +343,10 @@ class Dialect:
             (d.CODE_NO_OFFSET, self.no_offset),
             (d.CODE_TURN, self.turn),
             (d.CODE_TURN_OFF, self.turn_off),
+            (d.CODE_MIRROR, self.mirror),
+            (d.CODE_MIRROR_OFF, self.mirror_off),
+            (d.CODE_CORNER_ARC, self.corner_arc),
+            (d.CODE_CORNER_MEETING, self.corner_meeting),
         ):
             for code in codes:
                 table[_tenfold(code)] = special
@@ -249,6 +370,7 @@ class Dialect:
         """Return the names of the statements, each with a line end behind it, and their kinds."""
         pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
         pairs += [(f'"{name}"', _kind(d.TOOL_NAME, number)) for name, number in self.tool_names.items()]
+        pairs += [(name, _kind(d.VARIABLE, number)) for name, number in self.variables.items()]
         text = "".join(f"{name}\n" for name, _ in pairs).encode()
         return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
 
@@ -266,6 +388,9 @@ class Dialect:
             "g80_keeps_motion": int(self.g80_keeps_motion),
             "idle_letters": sum(1 << v.index_of(letter) for letter in self.idle_letters),
             "end_m": self.end_m,
+            "lead": self.lead,
+            "square_corners": int(self.square_corners),
+            "d_holds": self.d_holds,
             "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
         }
 
@@ -280,7 +405,7 @@ def _kind(kind: int, value: int = 0) -> int:
 
 _FANUC_REFUSED = {
     _TILTED: (53.1, 53.6, 54.2, 68.2, 68.3, 68.4),
-    _SCALED: (51, 51.1),
+    _SCALED: (51,),
     _POLAR: (12.1, 112, 16),
     _BORING: (76, 87),
     _PROBING: (31, 37),
@@ -301,9 +426,11 @@ _FANUC: dict[str, Any] = {
     "offsets": (54.1,),
     "turn": (68,),
     "turn_off": (69,),
+    "mirror": (51.1,),
+    "mirror_off": (50.1,),
     "same": {63: 64, 62: 64},
     "exact": (9,),
-    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 50.1, 67, 69.1, 103, 187),
+    "harmless": (5, 5.1, 8, 13.1, 113, 15, 23, 25, 26, 50, 67, 69.1, 103, 187),
     "refused": _FANUC_REFUSED,
     "dwell_s": {"P": 0.001, "X": 1.0, "U": 1.0},
     "repeats_by_k": True,
@@ -322,8 +449,8 @@ _SINUMERIK_STATEMENTS = {
         *("FFWON", "FFWOF", "SOFT", "BRISK", "DRIVE", "STOPRE", "FIFOCTRL", "STARTFIFO", "STOPFIFO"),
         *("DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "UPATH", "SPATH"),
         *("ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORISOF", "ORISON", "ORIRESET"),
-        *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2", "KONT"),
-        *("NORM", "DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
+        *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2"),
+        *("DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
         *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
         "FGREF",
     ),
@@ -331,39 +458,46 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.TIP, 0): ("TRAFOOF",),
     _kind(d.FEED_AXES): ("FGROUP",),
     _kind(d.WHOLE_LINE): ("PROC", "EXTERN", "SETAL"),
-    _kind(d.REFUSED, _TILTED): ("CYCLE800", "TOROT", "TOFRAME", "TCARR"),
+    _kind(d.REFUSED, _TILTED): ("TOROT", "TOFRAME", "TCARR"),
     _kind(d.SHIFT, 0): ("TRANS",),
-    _kind(d.JUMP): ("GOTO", "GOTOF", "GOTOB", "IF"),
+    _kind(d.JUMP): (
+        *("GOTO", "GOTOF", "GOTOB", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR", "ENDFOR", "WHILE"),
+        *("ENDWHILE", "REPEAT", "REPEATB", "UNTIL"),
+    ),
+    _kind(d.DEFINE): ("DEF",),
     _kind(d.SHIFT, 1): ("ATRANS",),
     _kind(d.TURN, 0): ("ROT",),
     _kind(d.TURN, 1): ("AROT",),
+    _kind(d.APPROACH, 0): ("KONT",),
+    _kind(d.APPROACH, 1): ("NORM",),
+    _kind(d.NAMED_ARC, 0): ("CIP",),
+    _kind(d.NAMED_ARC, 1): ("CT",),
+    _kind(d.TURN, 2): ("MIRROR",),
+    _kind(d.TURN, 3): ("AMIRROR",),
     _kind(d.REFUSED, _ROTATED): ("ROTS", "AROTS", "CROT", "CROTS"),
-    _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE", "MIRROR", "AMIRROR"),
+    _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
         *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
         *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
-        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE83", "CYCLE85"),
-        *("CYCLE87", "CYCLE88", "CYCLE89", "CYCLE801", "CYCLE802"),
+        *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79"),
+        *("CYCLE87", "CYCLE88", "CYCLE801", "CYCLE802"),
     ),
-    _kind(d.CYCLE_CALL, 81): ("CYCLE81",),
-    _kind(d.CYCLE_CALL, 82): ("CYCLE82",),
+    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800)},
     _kind(d.MODAL_CALL): ("MCALL",),
-    _kind(d.REFUSED, _THREAD): ("CYCLE84", "CYCLE840"),
-    _kind(d.REFUSED, _BORING): ("CYCLE86",),
+    _kind(d.REFUSED, _THREAD): ("CYCLE840",),
     _kind(d.REFUSED, _FLOW): (
-        *("GOTOC", "GOTOS", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR"),
-        *("ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "CALL", "EXTCALL", "WHEN"),
+        *("GOTOC", "GOTOS", "CASE", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),
-    _kind(d.REFUSED, _VALUES): ("DEF", "REDEF", "SET"),
+    _kind(d.REFUSED, _VALUES): ("REDEF", "SET"),
     _kind(d.MARKED, d.CORNER_ROUND - d.CORNER_ROUND): ("RND",),
     _kind(d.MARKED, d.CORNER_SIDE - d.CORNER_ROUND): ("CHR",),
     _kind(d.MARKED, d.CORNER_LENGTH - d.CORNER_ROUND): ("CHF",),
     _kind(d.MARKED, d.TURN_DEG - d.CORNER_ROUND): ("RPL",),
     _kind(d.REFUSED, _CORNERS): ("RNDM", "FRC", "FRCM"),
-    _kind(d.REFUSED, _ANGLE): ("AR", "CIP", "CT", "INVCW", "INVCCW"),
+    _kind(d.REFUSED, _ANGLE): ("AR", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
 }
@@ -385,12 +519,15 @@ _LIST: Final = (
         "Sinumerik 840D sl, as CAM posts write it",
         programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
-        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
+        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
         no_offset=(500,),
         offsets=tuple(range(505, 600)),
-        harmless=(5, 601, 602, 603, 290, 450, 451, 460, 461, 462, 810, 811, 812, 621, 62),
+        corner_arc=(450,),
+        corner_meeting=(451,),
+        lead=d.LEAD_TO_CONTOUR,
+        harmless=(5, 601, 602, 603, 290, 460, 461, 462, 810, 811, 812, 621, 62),
         refused={
             _THREAD: (33, 34, 35, 331, 332, 63),
             _POLAR: (110, 111, 112),
@@ -399,7 +536,6 @@ _LIST: Final = (
             _SHIFT: (58, 59),
             _SETTING: (25, 26),
             _INCHES: (70,),
-            _LEAD: (41, 42),
         },
         dwell_s={"F": 1.0},
         dwell_turns="S",
@@ -408,18 +544,46 @@ _LIST: Final = (
         length_by_d=True,
     ),
 )
-DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in _LIST}
+_OF_TNC = {
+    _kind(d.HARMLESS): ("NOTED",),
+    _kind(d.CYCLE_CALL, v.CYCLE_BEHIND): ("HOLE",),
+    **{_kind(d.REFUSED, reason): (f"REFUSED_{reason}",) for reason in range(len(REASONS))},
+}
+_SINUMERIK = next(dialect for dialect in _LIST if dialect.name == "sinumerik")
+_HEIDENHAIN = replace(
+    _SINUMERIK,
+    name="heidenhain",
+    title="Heidenhain's conversational programs, as CAM posts write them",
+    syntax=d.STATEMENTS,
+    statements={
+        kind: (*_SINUMERIK.statements.get(kind, ()), *_OF_TNC.get(kind, ()))
+        for kind in (*_SINUMERIK.statements, *_OF_TNC)
+    },
+    is_conversational=True,
+)
+DIALECTS: Final[Mapping[str, Dialect]] = {dialect.name: dialect for dialect in (*_LIST, _HEIDENHAIN)}
 """The dialects by their names, the default first."""
 DEFAULT: Final = DIALECT_NAMES[0]
 OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Sinumerik"
-CONVERSATIONAL: Final = "Heidenhain's conversational programs (BEGIN PGM, L X+10 R0 FMAX) are not G-code"
+
+
+_LEADS: Final = {"a": d.LEAD_TO_CONTOUR, "b": d.LEAD_BY_CORNER}
+_D_HOLDS: Final = {"radius": d.D_IS_RADIUS, "diameter": d.D_IS_DIAMETER, "wear": d.D_IS_WEAR}
+
+
+def with_cutter(dialect: Dialect, lead_in: str | None, holds: str | None) -> Dialect:
+    """Return a Fanuc's dialect with G41 and G42, where the cell states how they lead in and what D holds."""
+    if dialect.programs != d.PROGRAMS_FANUC or lead_in is None or holds is None:
+        return dialect
+    refused = {**dialect.refused, _LEAD: (41.1, 42.1)}
+    return replace(
+        dialect, refused=refused, lead=_LEADS[lead_in], square_corners=True, d_holds=_D_HOLDS[holds]
+    )
 
 
 def dialect_of(name: str, source: str) -> Dialect:
     """Return a dialect by its name; raises `NotUnderstoodError` where it is none that is read."""
     if name in DIALECTS:
         return DIALECTS[name]
-    if name == "heidenhain":
-        raise input_error("dialect-unknown", CONVERSATIONAL, OTHER_POST, source=source)
     allowed = ", ".join(DIALECTS)
     raise input_error("dialect-unknown", f"dialect {name!r}; allowed: {allowed}", source=source)

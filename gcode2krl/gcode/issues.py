@@ -167,7 +167,7 @@ def program_issues(
             "start-unnamed",
             int(state["distance_unnamed_line"]),
             "a move before G90 or G91: with which of them a Fanuc starts is a parameter; read under G90",
-            "write G90 before it; or --allow start-unnamed where the control starts with G90, as a Haas does",
+            "write G90 before it, or state [program.start] distance in the cell",
         )
     if not state["ended"]:
         yield _no_end(cut_off=state["tape_marks"] == 1)

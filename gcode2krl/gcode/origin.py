@@ -10,7 +10,7 @@ import re
 from typing import Final, NamedTuple
 
 from gcode2krl.errors import input_error
-from gcode2krl.gcode.dialects import CONVERSATIONAL, OTHER_POST
+from gcode2krl.gcode.dialects import OTHER_POST
 
 FANUC_DIALECTS: Final = ("fanuc", "fanuc-calculator", "fanuc-increments")
 _HEAD_BYTES, _HEAD_LINES = 4000, 30
@@ -51,7 +51,8 @@ _SINUMERIK = Control("a Sinumerik (840D sl, 828D)", ("sinumerik",))
 _FANUC = Control("a Fanuc or Haas", FANUC_DIALECTS)
 _GRBL = Control("Grbl", ("grbl",))
 _LINUXCNC = Control("LinuxCNC", ("linuxcnc",))
-CONTROLS: Final = (_SINUMERIK, _FANUC, _GRBL, _LINUXCNC)
+_HEIDENHAIN = Control("a Heidenhain (conversational)", ("heidenhain",))
+CONTROLS: Final = (_HEIDENHAIN, _SINUMERIK, _FANUC, _GRBL, _LINUXCNC)
 
 
 def _pattern(*alternatives: str) -> re.Pattern[bytes]:
@@ -59,6 +60,10 @@ def _pattern(*alternatives: str) -> re.Pattern[bytes]:
 
 
 _MARKS: Final = (
+    (
+        _HEIDENHAIN,
+        _pattern(r"^\s*\d*\s*BEGIN +PGM\b[^\n]*", r"^\s*\d*\s*(?:L|C|CR) +[XY][+-][\d.]+[^\n]*\bR[0LR]\b"),
+    ),
     (
         _SINUMERIK,
         _pattern(
@@ -103,8 +108,8 @@ _CAM_FIRST = "make a program of it in a CAM system, and translate that"
 _FOREIGN: Final = (
     _Foreign(
         "dialect-unknown",
-        CONVERSATIONAL,
-        OTHER_POST,
+        "this is a conversational program for a Heidenhain (BEGIN PGM, L X+10 R0 FMAX), not G-code",
+        "read it with --dialect heidenhain",
         re.compile(rb"\A[\s%]*\d*\s*BEGIN\s+PGM\b|^\s*\d*\s*(?:L|CC|C|CR)\s+[XY][+-]\d.*\bR[0LR]\b", re.M),
         in_comments=True,
     ),

@@ -14,7 +14,8 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, NotUnderstoodError
-from gcode2krl.gcode.dialects import DEFAULT
+from gcode2krl.gcode.dialect_marks import PROGRAMS_FANUC
+from gcode2krl.gcode.dialects import DEFAULT, DIALECTS
 from gcode2krl.gcode.origin import cam_of, control_of
 from gcode2krl.gcode.read import read_gcode
 from gcode2krl.gcode.text import beginning
@@ -92,7 +93,7 @@ def overview_of(path: str | Path, dialect: str | None = None, search: tuple[str,
         comments=tuple(_comment(said) for said in named),
         offsets=_offsets(code),
         subprograms=_distinct(next(filter(None, groups)).decode() for groups in _CALL.findall(code)),
-        asked_of_cell=_asked(code, named, toolpath),
+        asked_of_cell=_asked(code, named, toolpath, spoken),
         issues=issues,
         **_figures(toolpath),
     )
@@ -165,7 +166,7 @@ def _offsets(code: bytes) -> tuple[str, ...]:
     return _distinct([*zeros, *shifts])
 
 
-def _asked(code: bytes, named: list[NamedTool], toolpath: Toolpath | None) -> tuple[str, ...]:
+def _asked(code: bytes, named: list[NamedTool], toolpath: Toolpath | None, dialect: str) -> tuple[str, ...]:
     """Return the keys of the cell that a translation will ask for, with what they are for."""
     in_code = {int(number) for number, _ in _TOOL.findall(code) if number}
     numbers = sorted((in_code or {said.tool for said in named if said.tool is not None}) - {0})
@@ -184,6 +185,8 @@ def _asked(code: bytes, named: list[NamedTool], toolpath: Toolpath | None) -> tu
         asked += [f"[m_code] M{m}" for m in codes if m not in (2, 6, 30)]
     if _CUTTER.search(code):
         asked.append("the diameter of the tool that D names: the program offsets the path itself (G41, G42)")
+        if DIALECTS[dialect].programs == PROGRAMS_FANUC:
+            asked.append("[program.cutter] lead_in, d: how this control leads in and out, and what D holds")
     if re.search(rb"(?<![A-Z])[ABC] *=? *-?\d*\.?\d", code, _FLAGS):
         asked.append("[machine]: the machine with rotary axes that the program is for")
     return tuple(asked)

@@ -26,7 +26,7 @@ from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
-from gcode2krl.gcode.siemens_words import SiemensFlow
+from gcode2krl.gcode.siemens_words import SiemensFlow, variables_of
 from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
@@ -108,6 +108,9 @@ class Program:
         first_line = int(self._line[-1]) + 1 if self.files else start_line
         text = text if text.endswith(b"\n") else text + b"\n"
         self.files.append(File(name, first_line, text, start_line))
+        if self._spoken.programs == d.PROGRAMS_SINUMERIK:
+            self._spoken = replace(self._spoken, variables={**self._spoken.variables, **variables_of(text)})
+            self._program.statement_names, self._program.statement_kinds = self._spoken.names()
         scanned, lines = Scanner(self._spoken).scan_whole(text, first_line)
         self.most_decimals = max(self.most_decimals, scanned.most_decimals)
         messages += len(self.messages)
@@ -194,14 +197,16 @@ class Program:
 
     def _look_at_siemens_lines(self, first_row: int, word_of_row: Ints) -> None:
         file = self.files[-1]
-        flow = SiemensFlow(file.text, file.first_line, self._line.astype(np.int64))
+        line_of_word = self._line.astype(np.int64)
+        flow = SiemensFlow(file.text, file.first_line, line_of_word, self._lines, word_of_row)
         for row in range(first_row, len(self._lines) - 1):
             start = int(self._lines["start"][row])
             content = self._text[start : self._text.index(b"\n", start)]
             if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
             else:
-                flow.add(self._lines, row, int(word_of_row[row]), content)
+                flow.add(row, content)
+        flow.finish()
         self._tell_subprograms()
 
     def _define(self, definitions: Iterable[Definition]) -> None:

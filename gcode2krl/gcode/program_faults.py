@@ -23,12 +23,17 @@
     MACRO_NULL,
     SIEMENS_VALUE,
     SIEMENS_BRACKET,
-    SIEMENS_ATAN2,
+    SIEMENS_TWO,
     SIEMENS_COMPARISONS,
     SIEMENS_SAME_BLOCK,
     SIEMENS_GOTO,
     NAME_COMMENT,
-) = range(27)
+    SIEMENS_UNDEFINED,
+    SIEMENS_DEF,
+    SIEMENS_TRUTH,
+    SIEMENS_FOR,
+    SIEMENS_BEHIND,
+) = range(32)
 
 EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     NO_VALUE: (
@@ -71,12 +76,36 @@ EXPRESSION_FAULTS: dict[int, tuple[str, str]] = {
     ),
     SIEMENS_VALUE: (
         "a value is missing here, or it is one that is not read",
-        "write numbers, R0 to R99 ( ) + - * / SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND LN EXP",
+        "write numbers, R0 to R99, variables of DEF ( ) + - * / DIV MOD SIN COS TAN ASIN ACOS ATAN2 SQRT ABS "
+        "POT TRUNC ROUND LN EXP MINVAL MAXVAL",
     ),
     SIEMENS_BRACKET: ("a bracket is not closed", "add )"),
-    SIEMENS_ATAN2: ("ATAN2 takes two arguments", "write ATAN2(y,x)"),
-    SIEMENS_COMPARISONS: ("two comparisons stand in one bracket", "write them in two lines with IF"),
-    SIEMENS_SAME_BLOCK: ("an R parameter is set and used, or set twice, in one block", "write two blocks"),
+    SIEMENS_TWO: ("ATAN2, MINVAL and MAXVAL take two arguments", "write ATAN2(y,x)"),
+    SIEMENS_COMPARISONS: (
+        "two comparisons stand in one bracket, and on this control AND, OR and XOR go before them",
+        "write (R1>5) AND (R2<3)",
+    ),
+    SIEMENS_SAME_BLOCK: (
+        "an R parameter or a variable is set and used, or set twice, in one block",
+        "write two blocks",
+    ),
+    SIEMENS_UNDEFINED: (
+        "a variable, or the pole CC, is used before the line that sets it has run",
+        "set it at the beginning of the program (DEF; Q5 = 0)",
+    ),
+    SIEMENS_DEF: (
+        "of DEF are read REAL, INT and BOOL with names of their own, and a value behind =",
+        "write DEF REAL WIDTH=20, DEPTH",
+    ),
+    SIEMENS_TRUTH: (
+        "NOT, AND, OR and XOR take what is true or false, and go before comparisons",
+        "write (R1>5) AND (R2<3)",
+    ),
+    SIEMENS_FOR: ("FOR counts an R parameter or an INT up by 1", "write FOR R1=1 TO 5"),
+    SIEMENS_BEHIND: (
+        "nothing but a comment may stand here, behind the condition",
+        "give it a block of its own",
+    ),
     SIEMENS_GOTO: (
         "IF and its condition are followed by something else than a jump",
         "write IF R1<5 GOTOB LOOP",
@@ -186,7 +215,12 @@ VALUE_REMEDIES: dict[int, str] = {
     FAULT_M98_MACRO,
     FAULT_M99_WORDS,
     FAULT_LOCAL,
-) = range(31)
+    FAULT_STRUCTURE,
+    FAULT_SECTION,
+    FAULT_SECTION_LABEL,
+    FAULT_SECTION_TIMES,
+    FAULT_FOR_END,
+) = range(36)
 O_WORD_FAULTS: dict[int, tuple[str, str]] = {
     FAULT_LABEL: ("O is not followed by a whole number or a <name>", "write O100 or O<name>"),
     FAULT_WORD: (
@@ -255,6 +289,25 @@ O_WORD_FAULTS: dict[int, tuple[str, str]] = {
         "M97 of a Haas calls the lines from N of its P on to M99; N stands once in the file, in no loop",
         "write N and this number at the first of these lines, and nowhere else",
     ),
+    FAULT_STRUCTURE: (
+        "IF, WHILE, FOR, LOOP and REPEAT have each an end of their own, and here one is missing or another's",
+        "nest them: ENDIF, ENDWHILE, ENDFOR, ENDLOOP, UNTIL, each alone in its block",
+    ),
+    FAULT_SECTION: (
+        "a jump leads out of the section of the program that REPEAT repeats",
+        "let it lead to the end of the section",
+    ),
+    FAULT_SECTION_LABEL: (
+        "REPEAT takes one label or two, each once in the program, around lines that it is not among; or "
+        "UNTIL "
+        "ends it",
+        "write START: before the lines, and REPEAT START P=3 behind them",
+    ),
+    FAULT_FOR_END: (
+        "the loop sets what its end, behind TO, is worked out from, and whether that counts is not sure",
+        "keep the end in a variable of its own",
+    ),
+    FAULT_SECTION_TIMES: ("P of REPEAT is how often, a whole number from 0 on", "write REPEAT START P=3"),
     FAULT_M99_WORDS: (
         "words stand behind M99: M99 P would go on at a line of the caller",
         "write M99 alone, or GOTO before it",

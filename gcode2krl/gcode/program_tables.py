@@ -26,6 +26,8 @@ LOCAL_PARAMETERS = 30
 """#1 to #30 are the arguments of a subprogram; each call has its own."""
 MOST_R = 100
 """R0 to R99 are there on every Sinumerik; more are a setting of the machine."""
+FIRST_REAL, FIRST_INT, FIRST_BOOL = 100, 2000, 4000
+"""Where the variables of a Sinumerik's program (DEF) stand among the parameters, by their type."""
 MACRO_LOCALS = 33
 """#1 to #33 are those of a macro on a Fanuc."""
 MACRO_COMMON, MACRO_KEPT, MACRO_END = (100, 199), (500, 999), 1000
@@ -63,7 +65,11 @@ ROOM_OF_LINE = 2 * (LINE_LIMIT + 1)
     KIND_MACRO_IF,
     KIND_MACRO_WHILE,
     KIND_SIEMENS_IF,
-) = range(22)
+    KIND_FOR,
+    KIND_ENDFOR,
+    KIND_UNTIL,
+    KIND_SECTION,
+) = range(26)
 """What a marked line is: a block, an O-line that says nothing here, one that has not been looked at, …"""
 
 LINE = np.dtype(
@@ -102,6 +108,7 @@ FRAME = np.dtype(
         ("times", "i8"),  # further runs of M98 L
         ("generation", "i8"),  # which names of the frame's row are its own
         ("entry", "i8"),
+        ("until", "i8"),  # word before which a section of a program that is repeated ends, 0 = none
         ("is_program", "i4"),
         ("has_arguments", "i4"),  # its parameters are its own
         ("main_line", "i4"),  # of the main program's file: the line of the call, 0 = this is that file

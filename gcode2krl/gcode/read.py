@@ -1,5 +1,6 @@
 """``read_gcode``: a file of G-code into a Toolpath, in pieces of bounded memory."""
 
+import io
 import math
 import os
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -18,8 +19,9 @@ from gcode2krl.gcode import machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
-from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
+from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of, with_cutter
 from gcode2krl.gcode.findings import DIALECT_STATEMENT
+from gcode2krl.gcode.heidenhain import Translator
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
@@ -43,6 +45,7 @@ from gcode2krl.gcode.state import (
     OF_CYCLE,
     WORK_OFFSETS,
     initial_state,
+    start_of,
 )
 from gcode2krl.gcode.text import beginning, pieces
 from gcode2krl.gcode.tool_comments import (
@@ -164,7 +167,7 @@ def read_stream(
 
     ``folders`` are all in which a file of a subprogram may be.
     """
-    spoken = replace(dialect_of(dialect, name), tool_names=tool_table.tools_by_name(cell))
+    spoken = replace(_of_cell(dialect_of(dialect, name), cell), tool_names=tool_table.tools_by_name(cell))
     if not (np.isfinite(chord_tolerance_mm) and chord_tolerance_mm > 0):
         raise input_error(
             "option-value", f"chord tolerance {chord_tolerance_mm} mm is not positive", source=name
@@ -188,7 +191,10 @@ def read_stream(
         mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
-    with ahead(_scanned(pieces(stream, name), spoken)) as scanned:
+    read_pieces = pieces(stream, name)
+    if spoken.is_conversational:
+        read_pieces, spoken = interpreter.translate(read_pieces)
+    with ahead(_scanned(read_pieces, spoken)) as scanned:
         head, named = _interpreted(interpreter, scanned, spoken, name, _size_of(stream), folders, progress)
     toolpath = interpreter.finish(head, cell)
     if cell is not None:
@@ -231,6 +237,16 @@ def _interpreted(
             if interpreter.check_rest(text, first_line) or rest_bytes > _MOST_REST_BYTES:
                 break
     return head, named
+
+
+def _of_cell(dialect: Dialect, cell: "Cell | None") -> Dialect:
+    """Return a dialect as the control of a cell speaks it: its start-up modes, and its cutter
+    compensation."""
+    if cell is None:
+        return dialect
+    cutter, modes = cell.program.cutter, cell.program.start.model_dump(exclude_none=True)
+    start = {**dialect.start, **start_of(modes)}
+    return replace(with_cutter(dialect, cutter.lead_in, cutter.d), start=start)
 
 
 def _mounted_tool(cell: "Cell | None") -> int:
@@ -323,6 +339,20 @@ class _Interpreter:
         self.most_decimals = 0
         self.rest_line = 0
         self.program: Program | None = None
+        self.original: list[bytes] | None = None
+        """Lines of a program that was translated."""
+
+    def translate(
+        self, read_pieces: Iterator[tuple[int, bytes]]
+    ) -> tuple[Iterator[tuple[int, bytes]], Dialect]:
+        """Return a conversational program as the core reads it, in pieces, and its dialect with its
+        variables."""
+        text = b"".join(piece for _, piece in read_pieces)
+        translator = Translator(text.decode("utf-8", "replace"))
+        translated = translator.text().encode()
+        self.original = text.split(b"\n")
+        self.spoken = replace(self.spoken, variables=translator.variables())
+        return pieces(io.BytesIO(translated), self.name), self.spoken
 
     @property
     def ended(self) -> bool:
@@ -409,6 +439,8 @@ class _Interpreter:
 
     def finish(self, head: bytes, cell: "Cell | None" = None) -> Toolpath:
         """Raise the errors that were found, or return the table."""
+        if self.original is not None:
+            self.texts = {n: self.original[n - 1] for n in self.texts if 0 < n <= len(self.original)}
         known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if self.state["corner"][0]:  # the program has ended before the block that makes it
             line = int(self.state["corner_line"][0])
@@ -481,7 +513,8 @@ class _Interpreter:
             cycle, m = divmod(abs(int(b)), OF_CYCLE)
             spindle: dict[str, Any] = {"rpm": a, "m": m, "line": line}
             if cycle:
-                spindle["cycle"] = f"G{cycle}"
+                of_sinumerik = self.spoken.programs == d.PROGRAMS_SINUMERIK
+                spindle["cycle"] = f"CYCLE{cycle}" if of_sinumerik else f"G{cycle}"
             return "spindle", {**spindle, "implied": True} if b == IMPLIED_M5 else spindle
         if kind == EVENT_COOLANT:
             return "coolant", {"mist": b in (1.0, 3.0), "flood": b >= 2.0, "m": int(a), "line": line}

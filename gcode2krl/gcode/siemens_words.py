@@ -1,6 +1,7 @@
-"""Jumps of a Sinumerik: which line GOTOF, GOTOB and GOTO lead to.
+"""Statements of a Sinumerik: where its jumps lead, what ends what, which lines REPEAT repeats; variables.
 
-All labels are written out, so all of it is known before the program runs.
+All labels are written out, so all of it is known before the program runs. Blocks and loops are those of
+the O-words (`o_words`), under labels of their own.
 """
 
 import re
@@ -13,52 +14,149 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.gcode import program_faults as faults
 from gcode2krl.gcode import program_tables as tables
+from gcode2krl.gcode.o_words import Flow, OLine
 
+_FLAGS = re.IGNORECASE | re.DOTALL
+_NAME = rb"[A-Z_][A-Z0-9_]+"
 _HEAD = rb"[ \t\r]*(?:/\d?)?[ \t\r]*(?:N[ \t]*(?P<block>\d+)[ \t]*)?"
-_LABEL = rb"(?P<label>[A-Z_][A-Z0-9_]+)[ \t]*:(?!=)"
-_LINE = re.compile(_HEAD + rb"(?:" + _LABEL + rb")?", re.IGNORECASE)
+_LABEL = rb"(?P<label>" + _NAME + rb")[ \t]*:(?!=)"
+_END = rb"[ \t\r\x1a]*(?:;.*)?\Z"
+_LINE = re.compile(_HEAD + rb"(?:" + _LABEL + rb")?", _FLAGS)
+_STATEMENT = _HEAD + rb"(?:" + _NAME + rb"[ \t]*:(?!=))?[ \t]*"
 _JUMP = re.compile(
-    _HEAD
-    + rb"(?:[A-Z_][A-Z0-9_]+[ \t]*:(?!=))?[ \t]*(?:IF\b(?P<test>[^;]*?))?"
-    + rb"\bGOTO(?P<way>[FB]?)[ \t]+(?P<target>[A-Z_][A-Z0-9_]+|N\d+)[ \t\r\x1a]*(?:;.*)?\Z",
-    re.IGNORECASE | re.DOTALL,
+    _STATEMENT
+    + rb"(?:IF\b(?P<test>[^;]*?))?"
+    + rb"\bGOTO(?P<way>[FB]?)[ \t]+(?P<target>[A-Z_][A-Z0-9_]+|N\d+)"
+    + _END,
+    _FLAGS,
 )
+_BLOCK = re.compile(
+    _STATEMENT
+    + rb"(?P<word>IF|ELSE|ENDIF|WHILE|ENDWHILE|FOR|ENDFOR|LOOP|ENDLOOP|REPEAT(?="
+    + _END
+    + rb")|UNTIL)\b",
+    _FLAGS,
+)
+_SECTION = re.compile(
+    _STATEMENT
+    + rb"REPEAT(?P<one>B?)[ \t]+(?P<first>"
+    + _NAME
+    + rb")(?:[ \t]+(?P<last>(?!P[ \t]*=)"
+    + _NAME
+    + rb"))?"
+    + rb"(?:[ \t]+P[ \t]*=(?P<times>[^;]*)|(?="
+    + _END
+    + rb"))",
+    _FLAGS,
+)
+_ALONE = re.compile(_END, _FLAGS)
+_DEFINED = re.compile(
+    rb"^[ \t\r]*(?:/\d?)?[ \t]*(?:N\d+[ \t]*)?DEF[ \t]+(?P<type>REAL|INT|BOOL)\b(?P<names>[^;\n]*)",
+    _FLAGS & ~re.DOTALL | re.MULTILINE,
+)
+_VARIABLE = re.compile(rb"[ \t]*([A-Z_]{2}[A-Z0-9_]*)[ \t]*(?:=|,|\Z)", re.IGNORECASE)
+_ROOM = {
+    b"REAL": (tables.FIRST_REAL, tables.FIRST_INT),
+    b"INT": (tables.FIRST_INT, tables.FIRST_BOOL),
+    b"BOOL": (tables.FIRST_BOOL, tables.MOST_PARAMETERS),
+}
+_LOOP_END = re.compile(rb"\bTO\b(?P<end>[^;]*)", _FLAGS)
+_NAMED = re.compile(rb"\b(?:R\d+|[A-Z_]{2}\w*)\b(?![ \t]*\()", re.IGNORECASE)
+_OPENS = {"if": "if", "while": "while", "for": "while", "loop": "while", "repeat": "do"}
+_ENDS = {
+    "else": "else",
+    "endif": "endif",
+    "endwhile": "endwhile",
+    "endfor": "endwhile",
+    "endloop": "endwhile",
+} | {"until": "while"}
+_OPENED_BY = {
+    "endif": "if",
+    "else": "if",
+    "endwhile": "while",
+    "endfor": "for",
+    "endloop": "loop",
+    "until": "repeat",
+}
+_WITH_EXPRESSION = ("if", "while", "for", "until")
+
+
+def variables_of(text: bytes) -> dict[str, int]:
+    """Return the numbers, as parameters, of the variables that a program defines, by names in capitals."""
+    numbers: dict[str, int] = {}
+    free = {name: first for name, (first, _) in _ROOM.items()}
+    for found in _DEFINED.finditer(text):
+        of_type = found["type"].upper()
+        for part in found["names"].rstrip(b" \t\r").split(b","):
+            name = _VARIABLE.match(part)
+            if name is None or free[of_type] == _ROOM[of_type][1]:
+                continue
+            numbers.setdefault(name[1].upper().decode(), free[of_type])
+            free[of_type] += 1
+    return numbers
 
 
 class SiemensFlow:
-    """Fills in the jumps of one file."""
+    """Fills in the jumps, blocks and loops of one file."""
 
-    def __init__(self, text: bytes, first_line: int, line_of_word: Ints) -> None:
-        """Take the text of a program from its first line on, and the line of each of its words."""
+    def __init__(
+        self, text: bytes, first_line: int, line_of_word: Ints, lines: NDArray[Any], word_of_row: Ints
+    ) -> None:
+        """Take the text of a program from its first line on, the line of each of its words, and its marked
+        lines."""
+        self._lines, self._word_of_row, self._line_of_word = lines, word_of_row, line_of_word
+        self._flow = Flow(lines, word_of_row, {})
+        self._open: list[tuple[str, int]] = []
+        """The word of each block or loop that is open, and its row."""
+        self._blocks: list[int] = []
+        self._contents = text.split(b"\n")
+        self._first_line = first_line
         self._words: dict[bytes, list[int]] = {}
         """Words at which the lines of a label or a block number begin, in their order."""
-        names, lines = [], []
-        for line, content in enumerate(text.split(b"\n"), start=first_line):
+        names, numbers = [], []
+        for line, content in enumerate(self._contents, start=first_line):
             found = _LINE.match(content)
             if found is None:
                 continue
             for name in (found["label"], b"N%d" % int(found["block"]) if found["block"] else None):
                 if name is not None:
                     names.append(name.upper())
-                    lines.append(line)
-        words = np.searchsorted(line_of_word, np.array(lines, np.int64)).tolist()
+                    numbers.append(line)
+        words = np.searchsorted(line_of_word, np.array(numbers, np.int64)).tolist()
         for name, word in zip(names, words, strict=True):
             self._words.setdefault(name, []).append(word)
 
-    def add(self, lines: NDArray[Any], row: int, word: int, content: bytes) -> None:
-        """Take the line of a row; what is no jump stays a block."""
-        lines["kind"][row] = tables.KIND_BLOCK
-        found = _JUMP.match(content)
-        if found is None:
-            return
-        target = self._target(found["target"].upper(), found["way"].upper(), word)
+    def add(self, row: int, content: bytes) -> None:
+        """Take the line of a row, in the order of the file; what does not lead elsewhere stays a block."""
+        self._lines["kind"][row] = tables.KIND_BLOCK
+        if (jump := _JUMP.match(content)) is not None:
+            self._jump(row, jump)
+        elif (section := _SECTION.match(content)) is not None:
+            self._section(row, section)
+        elif (block := _BLOCK.match(content)) is not None:
+            self._block(row, block["word"].decode().lower(), block.end(), content)
+
+    def finish(self) -> None:
+        """Whatever is open at the end of the file has no end."""
+        self._flow.finish()
+        for row in self._blocks:
+            if (
+                self._lines["kind"][row] == tables.KIND_FAULT
+                and self._lines["fault"][row] != faults.FAULT_FOR_END
+            ):
+                self._lines["fault"][row] = faults.FAULT_STRUCTURE
+
+    # --- jumps ------------------------------------------------------------------------------------------
+
+    def _jump(self, row: int, found: re.Match[bytes]) -> None:
+        target = self._target(found["target"].upper(), found["way"].upper(), int(self._word_of_row[row]))
         if target is None:
-            lines["kind"][row], lines["fault"][row] = tables.KIND_FAULT, faults.FAULT_NO_LABEL
+            self._fault(row, faults.FAULT_NO_LABEL)
             return
-        lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
-        lines["target"][row] = target
+        self._lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
+        self._lines["target"][row] = target
         if found["test"] is not None:
-            lines["expression"][row] = lines["start"][row] + found.start("test")
+            self._lines["expression"][row] = self._lines["start"][row] + found.start("test")
 
     def _target(self, name: bytes, way: bytes, word: int) -> int | None:
         """Return the next line of a name forwards (F), the last one backwards (B), or either."""
@@ -68,3 +166,86 @@ class SiemensFlow:
         if way != b"B" and split < len(known):
             return known[split]
         return known[split - 1] if way != b"F" and split else None
+
+    def _fault(self, row: int, fault: int) -> None:
+        self._lines["kind"][row], self._lines["fault"][row] = tables.KIND_FAULT, fault
+
+    # --- blocks and loops -------------------------------------------------------------------------------
+
+    def _block(self, row: int, word: str, behind: int, content: bytes) -> None:
+        self._blocks.append(row)
+        alone = word in _WITH_EXPRESSION or _ALONE.match(content, behind) is not None
+        if word in _OPENS:
+            self._open.append((word, row))
+            self._flow.add(row, OLine(f"{row}", _OPENS[word], behind, alone))
+        elif not self._open or self._open[-1][0] != _OPENED_BY[word]:
+            self._fault(row, faults.FAULT_STRUCTURE)
+            self._flow.add_refused(row, is_o_line=True)
+            return
+        else:
+            begin = self._open[-1][1]
+            self._flow.add(row, OLine(f"{begin}", _ENDS[word], behind, alone))
+            if word != "else":
+                self._open.pop()
+        if self._lines["kind"][row] != tables.KIND_FAULT:
+            self._set_kind(row, word)
+
+    def _set_kind(self, row: int, word: str) -> None:
+        """Let a line be what its O-word is not."""
+        lines = self._lines
+        if word == "loop":
+            lines["kind"][row] = tables.KIND_NOTHING
+        elif word == "for":
+            lines["kind"][row] = tables.KIND_FOR
+        elif word == "until":
+            lines["kind"][row] = tables.KIND_UNTIL
+        elif word == "endfor":
+            begin = int(np.flatnonzero(self._word_of_row == lines["target"][row])[-1])
+            lines["kind"][row] = tables.KIND_ENDFOR
+            lines["target"][row] += 1
+            lines["expression"][row] = lines["expression"][begin]
+            if self._sets_its_end(self._line_of(begin), self._line_of(row)):
+                self._fault(begin, faults.FAULT_FOR_END)
+
+    def _line_of(self, row: int) -> int:
+        return int(self._line_of_word[self._word_of_row[row]]) - self._first_line
+
+    def _sets_its_end(self, first: int, last: int) -> bool:
+        """Tell whether lines between FOR and ENDFOR set a parameter that the loop's end depends on."""
+        end = _LOOP_END.search(self._contents[first])
+        names = _NAMED.findall(end["end"]) if end is not None else []
+        if not names:
+            return False
+        sets = re.compile(rb"\b(?:" + b"|".join(names) + rb")[ \t]*=(?!=)", re.IGNORECASE)
+        return any(sets.search(content.split(b";")[0]) for content in self._contents[first + 1 : last])
+
+    # --- repeated sections ------------------------------------------------------------------------------
+
+    def _section(self, row: int, found: re.Match[bytes]) -> None:
+        here = int(self._word_of_row[row])
+        begin = self._only(found["first"])
+        last = begin if found["one"] else self._only(found["last"]) if found["last"] else None
+        if begin is None or (found["last"] and last is None):
+            self._fault(row, faults.FAULT_SECTION_LABEL)
+            return
+        if last is not None:
+            until = self._behind(last)
+        else:
+            ends = [word for word in self._words.get(b"ENDLABEL", []) if word > begin]
+            until = ends[0] if ends and not begin < here < ends[0] else here
+        if until <= begin or begin <= here < until:
+            self._fault(row, faults.FAULT_SECTION_LABEL)
+            return
+        lines = self._lines
+        lines["kind"][row], lines["target"][row], lines["end"][row] = tables.KIND_SECTION, begin, until
+        times = found.start("times")
+        lines["expression"][row] = lines["start"][row] + max(0, times)
+
+    def _only(self, name: bytes) -> int | None:
+        """Return the word of a label that stands once."""
+        known = self._words.get(name.upper(), [])
+        return known[0] if len(known) == 1 else None
+
+    def _behind(self, word: int) -> int:
+        """Return the word at which the line behind that of a word begins."""
+        return int(np.searchsorted(self._line_of_word, self._line_of_word[word], side="right"))

@@ -9,11 +9,14 @@ the block might have set. A finding that rests on doubtful state is a consequenc
 reported. What is stated anew is out of doubt. Doubt begins only with an error, so it never hides the first.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints32
 from gcode2krl.gcode import vocabulary as v
+from gcode2krl.units import MM_PER_INCH
 
 STATE = np.dtype(
     [
@@ -54,6 +57,8 @@ STATE = np.dtype(
         ("rotated", "i1"),  # the work offset in force is rotated
         ("turned_deg", "f8"),  # by the program itself: ROT, G68
         ("turned_about_mm", "f8", 2),  # the programmed point that stays
+        ("mirrored", "i4"),  # bits of X and Y, mirrored by the program at that point
+        ("flipped", "i4"),  # the same, of the zero in force
         ("turned_anew", "i1"),  # a Fanuc's next move names X and Y
         ("offsets_taken", "i1"),  # the offsets of the start are in force
         ("home_28", "f8", 3),  # machine coordinates, mm
@@ -69,6 +74,8 @@ STATE = np.dtype(
         ("length_code", "i4"),  # G43, G43.4, G43.5 or G49, tenfold
         ("feed_word", "f8"),  # F as written: degrees a minute of a turn alone
         ("arcs", "i4"),
+        ("arc_end", "f8", 2),  # direction in the plane in which the last arc ends
+        ("arc_end_rows", "i8"),  # rows behind it
         ("mist", "i1"),
         ("flood", "i1"),
         ("ended", "i1"),
@@ -106,6 +113,10 @@ STATE = np.dtype(
         ("cutter_radius_mm", "f8"),
         ("cutter_other_mm", "f8", 2),  # diameters of G41 and of the tool that cuts, until it is told; else 0
         ("cutter_entered", "i1"),  # the entry move has been made
+        ("cutter_led", "i1"),  # the move behind it too, to which a control other than LinuxCNC leads
+        ("cutter_idle", "i4"),  # blocks without a move in the plane since the last one
+        ("cutter_d", "i4"),  # D that a Fanuc's G41 takes, -1 = none yet
+        ("cutter_unread", "i4"),  # bits of what a Sinumerik's G41 is not read under: G451, KONT
         ("cutter_failed", "i1"),  # a corner has been reported: further ones are consequences
         ("cutter_normal", "f8", 2),  # in the plane, from the programmed point (x, y, z) to the tool
         ("held_turn", "i4"),  # the element before this one: 1 = arc ccw, -1 = arc cw, 0 = line
@@ -142,7 +153,9 @@ STATE = np.dtype(
         ("cycle_unit_mm", "f8"),
         ("cycle_absolute", "i1"),
         ("modal_call", "i4"),  # number of the cycle behind each move that follows (MCALL), 0 = none
-        ("modal_mm", "f8", 4),  # its heights: start, bottom, end; and its dwell in seconds
+        ("modal_arguments", "i4"),  # how many it has, and which, in a unit
+        ("modal_argument", "f8", v.CYCLE_ARGUMENTS),
+        ("modal_unit_mm", "f8"),
     ],
     align=True,  # as C lays it out
 )
@@ -178,6 +191,8 @@ MODES = np.dtype(
 
 ZERO_DROPPED, ZERO_OFF = 1, 2
 """The tip's transformation was switched under a work offset, which the control may have dropped; G500."""
+UNREAD_CORNERS, UNREAD_APPROACH = 1, 2
+"""G451 and KONT of a Sinumerik."""
 CUTTER_ON, CUTTER_BESIDE = 1, 2
 """Cutter compensation is on; G40 has left the tool beside the programmed point, until a straight move."""
 DOUBT_X, DOUBT_Y, DOUBT_Z, DOUBT_MOTION, DOUBT_FEED, DOUBT_UNIT = (1 << k for k in range(6))
@@ -198,12 +213,35 @@ def initial_state() -> NDArray[np.void]:
     state["plane"] = v.PLANE_XY
     state["motion"] = state["motion_beside_cycles"] = v.MOTION_CANCELLED
     state["feed_mode"] = v.PER_MINUTE
-    state["selected_tool"] = -1
+    state["selected_tool"] = state["cutter_d"] = -1
     state["length_offset"] = np.nan
     state["offset_tool"] = -1
     state["tolerance"] = np.nan
     state["retract"] = v.G99
     return state
+
+
+AT_START = -1
+"""Instead of a line: the control starts so."""
+
+
+def start_of(modes: Mapping[str, str]) -> dict[str, float]:
+    """Return fields of the state for modes at the start, G-codes by their group: ``{"distance": "G90"}``."""
+    code = {group: int(name[1:]) for group, name in modes.items()}
+    start: dict[str, float] = {}
+    if "motion" in code:
+        start |= {"motion": code["motion"], "motion_beside_cycles": code["motion"]}
+    if "plane" in code:
+        start["plane"] = code["plane"]
+    if "unit" in code:
+        start |= {"unit_mm": MM_PER_INCH if code["unit"] == v.G20 // v.TENFOLD else 1.0, "unit_named": 1}
+    if "distance" in code:
+        start |= {"absolute": code["distance"] == v.G90 // v.TENFOLD, "distance_line": AT_START}
+    if "feed" in code:
+        start["feed_mode"] = code["feed"]
+    if "retract" in code:
+        start |= {"retract": code["retract"] * v.TENFOLD, "retract_line": AT_START}
+    return start
 
 
 UNKNOWN_GROUP, UNSUPPORTED_GROUP = -1, -2

@@ -81,6 +81,13 @@ MOTION_CANCELLED, MOTION_RAPID, MOTION_LINE, MOTION_ARC_CW, MOTION_ARC_CCW = -1,
 FIRST_CYCLE, CYCLE_CHIP, CYCLE_TAP_LEFT, CYCLE_DRILL, CYCLE_DWELL, CYCLE_PECK = 73, 73, 74, 81, 82, 83
 CYCLE_TAP, CYCLE_REAM, CYCLE_BORE_STOP, CYCLE_BORE = 84, 85, 86, 89
 """Canned cycles among the motion modes; no other mode has a number as large as the first."""
+CYCLE_SWIVEL = 800
+"""Of a Sinumerik, CYCLE800."""
+CYCLE_BEHIND = 1000
+"""A hole behind the move of its block: the arguments are kind and feed, and then those of the cycle of
+that kind."""
+CYCLE_ARGUMENTS = 26
+"""Arguments of a Sinumerik's CYCLE84, which has most, and these two."""
 PLANE_XY, PLANE_ZX, PLANE_YZ = 17, 18, 19
 """Planes of the state: the G number."""
 INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95

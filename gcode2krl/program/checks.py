@@ -155,7 +155,7 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _taps(event: Event) -> bool:
-    return event.kind == "spindle" and event.values.get("cycle") in ("G74", "G84")
+    return event.kind == "spindle" and event.values.get("cycle") in ("G74", "G84", "CYCLE84")
 
 
 def _tapping(cycles: dict[int, str]) -> Iterator[Issue]:

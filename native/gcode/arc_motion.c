@@ -82,6 +82,61 @@ static bool centre_by_words(Block *b, Arc *arc) {
     return true;
 }
 
+/* Find the direction in the plane in which the last row ends; return false where it has none, or another frame. */
+static bool direction_before(const Block *b, const Arc *arc, Point *along) {
+    const State *s = b->state;
+    const Rows *rows = &b->machine->rows;
+    const int64_t last = b->counts->rows - 1;
+    if (s->rotated || compensates(s) || last < 1 || AT(rows->machine, last))
+        return false;
+    if (s->arc_end_rows == b->counts->rows) {
+        *along = (Point){s->arc_end[0], s->arc_end[1]};
+        return true;
+    }
+    const Point to = {CELL(rows->position_mm, last, arc->first), CELL(rows->position_mm, last, arc->second)};
+    const Point from = {CELL(rows->position_mm, last - 1, arc->first), CELL(rows->position_mm, last - 1, arc->second)};
+    const double length_mm = distance(from, to);
+    *along = (Point){(to.u - from.u) / length_mm, (to.v - from.v) / length_mm};
+    return AT(rows->arc, last) == NO_ARC && length_mm > SMALLEST_RADIUS_MM && distance(to, arc->from) < SMALLEST_RADIUS_MM;
+}
+
+/* CT: the arc that leaves the way of the row before at its end. */
+static bool centre_by_tangent(const Block *b, Arc *arc) {
+    const Point way = {arc->to.u - arc->from.u, arc->to.v - arc->from.v};
+    Point along;
+    if (!direction_before(b, arc, &along))
+        return false;
+    const double aside_mm = along.u * way.v - along.v * way.u, radius_mm = 0.5 * (squared(way.u) + squared(way.v)) / aside_mm;
+    arc->centre = (Point){arc->from.u - radius_mm * along.v, arc->from.v + radius_mm * along.u};
+    b->state->motion = aside_mm > 0.0 ? V_MOTION_ARC_CCW : V_MOTION_ARC_CW;
+    return fabs(aside_mm) > SMALLEST_RADIUS_MM;
+}
+
+/* CIP: the circle through the start, a point and the end, by way of the point. */
+static bool centre_by_point(const Block *b, Arc *arc) {
+    State *s = b->state;
+    const double *base_mm = work_offset_mm(b), here_mm[3] = {s->x, s->y, s->z};
+    double via_mm[3];
+    for (int axis = 0; axis < 3; axis++)
+        via_mm[axis] = b->via_named >> axis & 1 ? b->via[axis] * s->unit_mm + (s->absolute ? base_mm : here_mm)[axis] : here_mm[axis];
+    const bool named = b->via_named >> arc->first & b->via_named >> arc->second & 1;
+    const Point p = {via_mm[arc->first] - arc->from.u, via_mm[arc->second] - arc->from.v};
+    const Point q = {arc->to.u - arc->from.u, arc->to.v - arc->from.v};
+    const double twice_mm2 = 2.0 * (p.u * q.v - p.v * q.u), pp = squared(p.u) + squared(p.v), qq = squared(q.u) + squared(q.v);
+    arc->centre = (Point){arc->from.u + (q.v * pp - p.v * qq) / twice_mm2, arc->from.v + (p.u * qq - q.u * pp) / twice_mm2};
+    s->motion = twice_mm2 > 0.0 ? V_MOTION_ARC_CCW : V_MOTION_ARC_CW;
+    return named && fabs(twice_mm2) > squared(SMALLEST_RADIUS_MM) && arc->to_w == arc->from_w && via_mm[arc->third] == arc->from_w;
+}
+
+/* Find the centre of CIP or CT; return false, after a report, where there is none. */
+static bool centre_by_name(Block *b, Arc *arc) {
+    const bool words = b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K] || b->has[V_WORD_R] || b->has[V_WORD_P];
+    if (!words && (b->named_arc == D_ARC_VIA ? centre_by_point(b, arc) : centre_by_tangent(b, arc)))
+        return true;
+    report_unless(b, arc->rests_on, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_NAMED_ARC});
+    return false;
+}
+
 /* --- what does not fit --------------------------------------------------------------------------------- */
 
 /* Return the centre as the other of G90.1 and G91.1 would have it. */
@@ -101,7 +156,7 @@ static void report_unknown_start(Block *b) {
         b->counts->consequences++;
     else
         report_at(b, (int32_t)least(b->line, s->unknown_feed_line), F_UNKNOWN_START,
-                  (Says){.a = s->absolute ? 0 : s->distance_line});
+                  (Says){.a = s->absolute ? 0 : most(0, s->distance_line)});
     s->unknown_reported = 1;
 }
 
@@ -169,6 +224,10 @@ void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t c
         emit(b->machine, b->line, mm_s, false, false, s->arcs);
         note_time(b, time_s);
     }
+    const double side = sweep < 0.0 ? -1.0 : 1.0, radius_mm = distance(arc->to, arc->centre);
+    s->arc_end[0] = -side * (arc->to.v - arc->centre.v) / radius_mm;
+    s->arc_end[1] = side * (arc->to.u - arc->centre.u) / radius_mm;
+    s->arc_end_rows = b->counts->rows;
     s->arcs++;
 }
 
@@ -240,7 +299,9 @@ bool arc_move(Block *b, Arc *arc) {
     }
     if (!take_turn(b, false) || !axis_word_is_harmless(b, arc))
         return true;
-    if (!(b->has[V_WORD_R] ? centre_by_radius(b, arc) : centre_by_words(b, arc)))
+    if (!(b->named_arc         ? centre_by_name(b, arc)
+          : b->has[V_WORD_R] ? centre_by_radius(b, arc)
+                             : centre_by_words(b, arc)))
         return true;
     const int32_t turns = b->has[V_WORD_P] ? whole(b->word[V_WORD_P]) : 1;
     if (turns < 1 || turns > MOST_TURNS) {

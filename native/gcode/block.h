@@ -13,8 +13,6 @@ typedef struct {
     Ints32 line;
 } Words;
 
-enum { MOST_ARGUMENTS = 9 }; /* of CYCLE82 */
-
 /* One block, its words sorted: values by letter, G-codes by modal group and M-codes, -1 = none. */
 typedef struct {
     Machine *machine;
@@ -40,10 +38,13 @@ typedef struct {
     uint8_t turn;                             /* TURN_… of this block, 0 = none */
     bool turn_stated;
     double turned_deg;                        /* RPL= */
+    uint8_t named_arc;                        /* ARC_VIA or ARC_TANGENT, 0 = neither */
+    double via[3];                            /* I1= J1= K1= */
+    int32_t via_named;                        /* bits of those that the block has */
     int32_t cycle;                            /* number of a Sinumerik's cycle, 0 = none */
     bool modal;                               /* MCALL */
     int32_t arguments;                        /* of the cycle, NaN = left out */
-    double argument[MOST_ARGUMENTS];
+    double argument[V_CYCLE_ARGUMENTS];
     double turn_deg[V_ROTARY_AXES]; /* where the rotary words lead, once they have been read */
 } Block;
 

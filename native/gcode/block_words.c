@@ -155,6 +155,8 @@ static Taken take(Block *b, uint8_t c, double value) {
     const int index = index_of_letter(c);
     if (b->next_word == D_NEXT_VECTOR)
         return take_component(b, index - V_WORD_A, value) ? UNDERSTOOD : faulty(S_DOUBT_POSITION);
+    if (b->next_word == D_NEXT_VIA)
+        return take_via(b, index - V_WORD_I, value) ? UNDERSTOOD : faulty(S_DOUBT_POSITION);
     const bool repeated = b->has[index];
     if (b->next_word)
         say_of_word(b, index);

@@ -1,5 +1,9 @@
 /* Cutter radius compensation: a filter between the motion of a block and its rows.
 
+   Controls other than LinuxCNC lead in otherwise, and a Fanuc goes around an outside corner in straight moves
+   (D_LEAD_…; Fanuc, Operator's Manual, cutter compensation: types A and B by parameter 5003; Siemens, Programming
+   Manual, Fundamentals: NORM and G450).
+
    The state's x, y, z stay the programmed point; the rows get the centre of the tool, a radius to the side.
    At an outside corner an arc is put in. At an inside corner the element before ends early, where the tool
    touches both: it has been written already and is *held*, its rows are written again. Moves along the tool,
@@ -17,6 +21,10 @@ static const double STANDING_MM = 1e-9;
 static const double SLACK_MM = 1e-7;
 /* An entry arc whose end is this near to square to the way there (cosine) has no centre: LinuxCNC's bound. */
 static const double SMALLEST_COSINE = 1e-4;
+/* The same for controls whose corners are exact; what rounding makes of a smooth one. */
+static const double EXACT_CORNER_RAD = 1e-6;
+/* Blocks without a move in the plane between two moves: behind more a control may not see the corner. */
+enum { MOST_IDLE = 1, ROWS_OF_CORNER = 4 };
 
 /* What a block adds to the path of the tool. */
 typedef struct {
@@ -227,12 +235,30 @@ void stand_beside(State *s) {
 
 /* --- corners -------------------------------------------------------------------------------------------- */
 
+/* Go around an outside corner as a Fanuc does: along both moves to where they meet, or, where the path turns by more
+   than a right angle, a radius beyond each. */
+static void square_corner(Block *b, Point from, Point before, Point to, Point after, double w, double mm_s) {
+    const double cosine = dot(before, after), radius_mm = b->state->cutter_radius_mm;
+    if (cosine >= 0.0) {
+        emit_at(b, plus(from, radius_mm * fabs(cross(before, after)) / (1.0 + cosine), before), w, mm_s);
+        return;
+    }
+    emit_at(b, plus(from, radius_mm, before), w, mm_s);
+    emit_at(b, plus(to, -radius_mm, after), w, mm_s);
+}
+
 /* Go around an outside corner: an arc about the programmed point, or a rapid move. */
 static void go_around(Block *b, const Element *next) {
     State *s = b->state;
     const double programmed_mm[3] = {s->x, s->y, s->z}, w = along_tool(s, programmed_mm);
     const Point corner = in_plane(s, programmed_mm), from = tool_at(s);
     double angle;
+    if (b->machine->square_corners) {
+        square_corner(b, from, held_direction(s), next->piece.at, next->along, w, next->mm_s);
+        if (next->piece.turn != 0)
+            emit_at(b, next->piece.at, w, next->mm_s);
+        return;
+    }
     if (isinf(next->mm_s)) {
         emit_at(b, next->piece.at, w, next->mm_s);
         return;
@@ -247,8 +273,21 @@ static bool join(Block *b, const Element *next, Point *from) {
     const Piece before = held_piece(s);
     const int turn = next->piece.turn != 0 ? next->piece.turn : before.turn;
     const bool tool_outside = turn != 0 && turn != s->cutter_side;
+    const double smallest_rad = b->machine->lead ? EXACT_CORNER_RAD : SMALLEST_CORNER_RAD;
+    const Corner corner = corner_between(held_direction(s), next->along, s->cutter_side, tool_outside, smallest_rad);
     *from = before.at;
-    switch (corner_between(held_direction(s), next->along, s->cutter_side, tool_outside)) {
+    if (b->machine->lead && (corner != SMOOTH || !s->cutter_led) && s->cutter_idle > MOST_IDLE) {
+        fault(b, F_DIALECT_STATEMENT, DR_REASON_LOOK_AHEAD);
+        return false;
+    }
+    if (b->machine->lead && !s->cutter_led) {
+        s->cutter_led = 1;
+        if (corner != OUTSIDE || b->machine->lead == D_LEAD_TO_CONTOUR) {
+            *from = next->piece.at;
+            return end_held(b, *from);
+        }
+    }
+    switch (corner) {
     case SMOOTH: return end_held(b, before.at);
     case OUTSIDE:
         if (!end_held(b, before.at))
@@ -262,11 +301,35 @@ static bool join(Block *b, const Element *next, Point *from) {
     const Point skew = before.turn == 0 ? next->skew : (Point){0.0, 0.0};
     after.centre = minus(after.centre, skew);
     if (!meeting_point(&before, &after, s->cutter_side, from)) {
+        *from = before.at;
+        if (corner_between(held_direction(s), next->along, s->cutter_side, tool_outside, SMALLEST_CORNER_RAD) == SMOOTH)
+            return end_held(b, before.at);
         fault(b, F_CUTTER_CORNER, 0.0);
         return false;
     }
     *from = plus(*from, 1.0, skew);
     return end_held(b, *from);
+}
+
+/* The straight move behind G40, where it leads around the corner of the contour's end; return false where there is no
+   room for its rows, and with a finding where it does not lead away. */
+bool lead_out(Block *b, const double to_mm[3], double mm_s) {
+    State *s = b->state;
+    const double here_mm[3] = {s->x, s->y, s->z}, w = along_tool(s, here_mm);
+    const Point here = in_plane(s, here_mm), way = minus(in_plane(s, to_mm), here);
+    if (hypot(way.u, way.v) <= STANDING_MM) {
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_LEAD_OUT});
+        return true;
+    }
+    const Point before = held_direction(s), after = unit(way), end = tool_at(s);
+    const Point begin = plus(here, s->cutter_radius_mm, quarter(after, s->cutter_side));
+    if (b->machine->lead != D_LEAD_BY_CORNER || corner_between(before, after, s->cutter_side, false, EXACT_CORNER_RAD) != OUTSIDE)
+        return true;
+    if (!has_room_for(b, ROWS_OF_CORNER))
+        return false;
+    square_corner(b, end, before, begin, after, w, mm_s);
+    emit_at(b, begin, w, mm_s);
+    return true;
 }
 
 /* --- lines and arcs ------------------------------------------------------------------------------------- */
@@ -285,15 +348,15 @@ bool compensated_line(Block *b, const double to_mm[3], double mm_s) {
     const double from_w = along_tool(s, here_mm), to_w = along_tool(s, to_mm);
     const Point here = in_plane(s, here_mm), to = in_plane(s, to_mm), way = minus(to, here);
     const double length_mm = hypot(way.u, way.v);
-    if (!s->cutter_entered && length_mm <= radius_mm) {
+    if (!s->cutter_entered && !b->machine->lead && length_mm <= radius_mm) {
         fault(b, F_CUTTER_ENTRY, length_mm);
         emit_at(b, to, to_w, mm_s);
         return true;
     }
-    if (!has_room_for(b, chords_of(b, radius_mm, 2.0 * PI) + 1))
+    if (!has_room_for(b, chords_of(b, radius_mm, 2.0 * PI) + ROWS_OF_CORNER))
         return false;
     if (length_mm <= STANDING_MM) {
-        emit_at(b, tool_at(s), to_w, mm_s);
+        emit_at(b, s->cutter_entered ? tool_at(s) : to, to_w, mm_s);
         return true;
     }
     Element line = {.piece.along = unit(way), .to_w = to_w, .mm_s = mm_s};
@@ -359,6 +422,10 @@ bool compensated_arc(Block *b, const Arc *arc, int64_t turns, double mm_s) {
     const bool ccw = s->motion == V_MOTION_ARC_CCW, entered = s->cutter_entered;
     const double larger_mm = greater(arc->from_radius_mm, arc->to_radius_mm) + s->cutter_radius_mm;
     double angle;
+    if (!entered && b->machine->lead) {
+        fault(b, F_DIALECT_STATEMENT, DR_REASON_ENTRY_ARC);
+        return true;
+    }
     double sweep_rad = fabs(sweep_angle(arc->from, arc->to, arc->centre, ccw, turns, &angle));
     Element element = {.mm_s = mm_s};
     Point from = arc->from;
@@ -367,7 +434,7 @@ bool compensated_arc(Block *b, const Arc *arc, int64_t turns, double mm_s) {
     if (!entered)
         sweep_rad = fabs(sweep_angle(from, element.to, element.piece.centre, ccw, turns, &angle));
     const double most_mm = greater(larger_mm, element.piece.radius_mm);
-    const int64_t chords = chords_of(b, most_mm, sweep_rad + 1.0) + chords_of(b, s->cutter_radius_mm, 2.0 * PI);
+    const int64_t chords = chords_of(b, most_mm, sweep_rad + 1.0) + chords_of(b, s->cutter_radius_mm, 2.0 * PI) + ROWS_OF_CORNER;
     if (chords > MOST_CHORDS) {
         report(b, F_ARC_TOO_LONG, (Says){.a = most_mm});
         return true;

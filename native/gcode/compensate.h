@@ -12,6 +12,7 @@ static inline bool compensates(const State *s) {
 
 void end_compensation(Block *block);
 void stand_beside(State *s);
+bool lead_out(Block *block, const double to_mm[3], double mm_s);
 bool compensated_line(Block *block, const double to_mm[3], double mm_s);
 bool compensated_arc(Block *block, const Arc *arc, int64_t turns, double mm_s);
 

@@ -53,6 +53,9 @@ static double of_tool(Floats diameter_mm, int32_t tool) {
     return tool >= 0 && tool < diameter_mm.rows ? AT(diameter_mm, tool) : NAN;
 }
 
+/* Return the diameter by which a tool is compensated, NaN where it is not declared. */
+double diameter_of(const Machine *machine, int32_t tool) { return of_tool(machine->tool_diameter_mm, tool); }
+
 /* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
 static double tool_diameter(Block *b, int32_t code) {
     const int32_t there = tool_in_spindle(b->machine);
@@ -66,7 +69,7 @@ static double tool_diameter(Block *b, int32_t code) {
         if (tool == 0)
             tool = there;
     }
-    const double diameter_mm = of_tool(b->machine->tool_diameter_mm, tool);
+    const double diameter_mm = diameter_of(b->machine, tool);
     if (tool == 0)
         report_unless(b, S_DOUBT_TOOL, F_CUTTER_NO_TOOL, (Says){.a = code});
     else if (isnan(diameter_mm))
@@ -74,7 +77,21 @@ static double tool_diameter(Block *b, int32_t code) {
     return tool == 0 ? NAN : diameter_mm;
 }
 
+/* Find the diameter that a Fanuc's D stands for: the offset of the tool in the spindle, whose number it has. */
+static double offset_diameter(Block *b) {
+    const int32_t there = tool_in_spindle(b->machine), d = b->state->cutter_d;
+    if (d == 0)
+        return 0.0;
+    if (d != there) {
+        report_unless(b, S_DOUBT_TOOL, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_D});
+        return NAN;
+    }
+    return tool_diameter(b, V_G41);
+}
+
 static double diameter(Block *b, int32_t code) {
+    if (b->machine->d_holds)
+        return offset_diameter(b);
     if (code == V_G41 || code == V_G42)
         return tool_diameter(b, code);
     if (b->has[V_WORD_D])
@@ -117,15 +134,18 @@ static void turn_on(Block *b, int32_t code) {
         report(b, F_CUTTER_TURNED, (Says){.a = code});
     if (b->has[V_WORD_L])
         report(b, F_CUTTER_LATHE, (Says){0});
+    if (b->machine->programs == D_PROGRAMS_SINUMERIK && s->cutter_unread)
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_CORNERS_OF_G41});
     const double diameter_mm = diameter(b, code);
     s->cutter_mode |= S_CUTTER_ON;
     s->cutter_code = code;
     s->cutter_line = b->line;
     s->cutter_side = (code < V_G42 ? 1 : -1) * (diameter_mm < 0.0 ? -1 : 1);
-    s->cutter_radius_mm = isnan(diameter_mm) || s->plane == V_PLANE_YZ ? 0.0 : 0.5 * fabs(diameter_mm);
-    s->cutter_entered = s->cutter_failed = 0;
+    const bool moves_nothing = isnan(diameter_mm) || s->plane == V_PLANE_YZ || b->machine->d_holds == D_D_IS_WEAR;
+    s->cutter_radius_mm = moves_nothing ? 0.0 : 0.5 * fabs(diameter_mm);
+    s->cutter_entered = s->cutter_failed = s->cutter_led = 0;
     s->cutter_other_mm[0] = s->cutter_other_mm[1] = 0.0;
-    if (!isnan(diameter_mm))
+    if (!isnan(diameter_mm) && b->machine->d_holds != D_D_IS_WEAR)
         compare_with_tool(b, diameter_mm);
 }
 
@@ -138,6 +158,8 @@ void cutter_compensation(Block *b) {
     } else if (code >= 0) {
         b->used[V_WORD_D] |= b->has[V_WORD_D];
         b->used[V_WORD_L] |= b->has[V_WORD_L];
+        if (b->state->cutter_mode & S_CUTTER_ON && b->machine->lead && code == b->state->cutter_code)
+            return; /* it says what is in force */
         if (b->state->cutter_mode & S_CUTTER_ON)
             refuse_under_compensation(b, code);
         else

@@ -112,7 +112,7 @@ static bool take_heights(Block *b, Cycle *c) {
                      (Says){.a = code, .b = 'X' + c->third, .c = s->plane});
     if (!(b->has[V_WORD_R] && b->has[bottom]) && s->cycle_absolute != s->absolute)
         return fails(b, S_DOUBT_DISTANCE, FC_DISTANCE_CHANGED,
-                     (Says){.a = s->cycle_line, .b = 'X' + c->third, .c = s->distance_line});
+                     (Says){.a = s->cycle_line, .b = 'X' + c->third, .c = most(0, s->distance_line)});
     const double r = b->has[V_WORD_R] ? b->word[V_WORD_R] : s->cycle_r;
     const double depth = b->has[bottom] ? b->word[bottom] : s->cycle_depth;
     c->r = s->absolute ? r : r + c->level;

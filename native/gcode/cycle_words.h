@@ -18,6 +18,10 @@ typedef struct {
 } Cycle;
 
 Cycle cycle_of(const Block *block);
+void go_along(Block *block, const Cycle *cycle, double along, bool known, double mm_s);
+void wait_here(Block *block, double seconds);
+void turn_spindle(Block *block, const Cycle *cycle, int32_t direction);
+bool has_cycle_room(Block *block, int64_t rows, int64_t events);
 bool drill_here(Block *block, const Cycle *cycle);
 bool cycle_words(Block *block, Cycle *cycle);
 void learn_across(Block *block, const Cycle *cycle);

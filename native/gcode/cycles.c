@@ -17,7 +17,7 @@ enum { MOST_CYCLE_ROWS = 1000000, ROWS_AROUND = 5, ROWS_PER_PECK = 3, EVENTS_PER
 /* --- moves ---------------------------------------------------------------------------------------------- */
 
 /* Write the row to a depth over the hole at hand. */
-static void go_along(Block *b, const Cycle *c, double along, bool known, double mm_s) {
+void go_along(Block *b, const Cycle *c, double along, bool known, double mm_s) {
     State *s = b->state;
     double at_mm[3];
     int8_t *known_axis[3] = {&s->known_x, &s->known_y, &s->known_z};
@@ -36,16 +36,16 @@ static void rapid_to(Block *b, const Cycle *c, double along) {
     go_along(b, c, along, along == c->clear && c->clear != c->r ? c->level_known : c->r_known, RAPID_MM_S);
 }
 
-static void wait(Block *b, double seconds) {
+void wait_here(Block *b, double seconds) {
     AT(b->machine->rows.dwell_s, b->counts->rows - 1) += seconds;
 }
 
-/* Turn the spindle: 1 = M3, -1 = M4, 0 = M5. */
-static void turn(Block *b, int32_t direction) {
+/* Turn the spindle in a cycle: 1 = M3, -1 = M4, 0 = M5. */
+void turn_spindle(Block *b, const Cycle *c, int32_t direction) {
     State *s = b->state;
     const int m = direction > 0 ? V_M3 : direction < 0 ? V_M4 : V_M5;
     s->direction = direction;
-    event(b, S_EVENT_SPINDLE, s->rpm * direction, m + S_OF_CYCLE * s->motion);
+    event(b, S_EVENT_SPINDLE, s->rpm * direction, m + S_OF_CYCLE * c->motion);
 }
 
 /* --- what is done in a hole ----------------------------------------------------------------------------- */
@@ -71,38 +71,42 @@ static void peck(Block *b, const Cycle *c) {
     }
 }
 
-/* Leave the hole at feed: LinuxCNC up to where the cycle ends, a Fanuc up to R and on at rapid speed. */
+/* Leave the hole at feed: LinuxCNC up to where the cycle ends, a Fanuc and a Sinumerik up to R and on at rapid speed. */
+static bool feeds_to_r(const Block *b) {
+    return b->machine->programs == D_PROGRAMS_FANUC || b->machine->programs == D_PROGRAMS_SINUMERIK;
+}
+
 static void leave_at_feed(Block *b, const Cycle *c) {
-    if (b->machine->programs == D_PROGRAMS_FANUC)
+    if (feeds_to_r(b))
         feed_to(b, c, c->r);
     else
         go_along(b, c, c->clear, c->clear != c->r ? c->level_known : c->r_known, c->mm_s);
 }
 
 static void rise_from_r(Block *b, const Cycle *c) {
-    if (b->machine->programs == D_PROGRAMS_FANUC && c->clear > c->r)
+    if (feeds_to_r(b) && c->clear > c->r)
         rapid_to(b, c, c->clear);
 }
 
 /* Tap: the spindle reverses at the bottom, and again above the hole. */
 static void tap(Block *b, const Cycle *c) {
     const int32_t direction = b->state->direction;
-    turn(b, 0);
-    turn(b, -direction);
-    wait(b, c->dwell_s);
+    turn_spindle(b, c, 0);
+    turn_spindle(b, c, -direction);
+    wait_here(b, c->dwell_s);
     leave_at_feed(b, c);
-    turn(b, 0);
-    turn(b, direction);
+    turn_spindle(b, c, 0);
+    turn_spindle(b, c, direction);
     rise_from_r(b, c);
 }
 
 /* Leave the hole with the spindle at rest, so that the tool draws no groove. */
 static void leave_at_rest(Block *b, const Cycle *c) {
     const int32_t direction = b->state->direction;
-    wait(b, c->dwell_s);
-    turn(b, 0);
+    wait_here(b, c->dwell_s);
+    turn_spindle(b, c, 0);
     rapid_to(b, c, c->clear);
-    turn(b, direction);
+    turn_spindle(b, c, direction);
 }
 
 /* Go from the retract plane to the bottom and to where the cycle ends. */
@@ -119,12 +123,12 @@ static void hole(Block *b, const Cycle *c) {
         break;
     case V_CYCLE_BORE_STOP: leave_at_rest(b, c); break;
     case V_CYCLE_BORE:
-        wait(b, c->dwell_s);
+        wait_here(b, c->dwell_s);
         leave_at_feed(b, c);
         rise_from_r(b, c);
         break;
     default:
-        wait(b, c->dwell_s);
+        wait_here(b, c->dwell_s);
         rapid_to(b, c, c->clear);
     }
 }
@@ -165,7 +169,7 @@ static void holes(Block *b, Cycle *c) {
 /* --- the block ------------------------------------------------------------------------------------------ */
 
 /* Tell whether there is room for so many rows and events; else say how much is wanted. */
-static bool has_cycle_room(Block *b, int64_t rows, int64_t events) {
+bool has_cycle_room(Block *b, int64_t rows, int64_t events) {
     Counts *counts = b->counts;
     counts->rows_wanted = counts->rows + rows;
     counts->events_wanted = counts->events + events;

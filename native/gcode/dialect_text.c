@@ -16,8 +16,6 @@ static int64_t behind_blanks(Bytes text, int64_t i) {
 
 static bool stands_at(Bytes text, int64_t i, uint8_t c) { return i < text.rows && AT(text, i) == c; }
 
-static bool is_of_name(uint8_t c) { return is_letter(c) || is_digit(c) || c == '_'; }
-
 static int64_t after_name(Bytes text, int64_t i) {
     while (i < text.rows && is_of_name(AT(text, i)))
         i++;
@@ -129,22 +127,24 @@ static int64_t dollar_line(Scan *scan, Evaluation *e, int64_t i, int64_t line, b
 
 /* --- statements ----------------------------------------------------------------------------------------- */
 
-/* Return the kind of the statement whose name stands from i to end, -1 for none. */
-static int32_t statement_kind(const Scan *scan, int64_t i, int64_t end) {
-    const Bytes names = scan->statement_names;
+/* Return the kind of the statement whose name stands from i to end, -1 for none; names end with their line. */
+int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t end) {
     int64_t at = 0;
-    for (int64_t k = 0; k < scan->statement_kinds.rows; k++) {
+    for (int64_t k = 0; k < kinds.rows; k++) {
         int64_t n = 0;
-        while (i + n < end && (AT(scan->text, i + n) & ~(is_letter(AT(scan->text, i + n)) ? CH_CASE_BIT : 0)) ==
-                                  AT(names, at + n))
+        while (i + n < end && (AT(text, i + n) & ~(is_letter(AT(text, i + n)) ? CH_CASE_BIT : 0)) == AT(names, at + n))
             n++;
         if (i + n == end && AT(names, at + n) == '\n')
-            return AT(scan->statement_kinds, k);
+            return AT(kinds, k);
         while (AT(names, at) != '\n')
             at++;
         at++;
     }
     return -1;
+}
+
+static int32_t kind_of(const Scan *scan, int64_t i, int64_t end) {
+    return statement_kind(scan->text, scan->statement_names, scan->statement_kinds, i, end);
 }
 
 enum { UNKNOWN_COUNTING = 1 }; /* a name in its place that is none of them */
@@ -268,6 +268,10 @@ static int64_t cycle_call(Scan *scan, Evaluation *e, int64_t i, int64_t number_o
     put(scan, D_CYCLE, (double)number_of_cycle, line);
     for (at = behind_blanks(text, at + 1); at < end; at = behind_blanks(text, at + 1)) {
         double value = NAN;
+        const int64_t behind_text = stands_at(text, at, '"') ? after_quotes(text, at) : at;
+        const bool names_nothing = behind_text == at + 2 || number_of_cycle == V_CYCLE_SWIVEL;
+        if (behind_text > at && names_nothing && ends_argument(text, behind_text))
+            at = behind_blanks(text, behind_text);
         if (AT(text, at) != ',' && AT(text, at) != ')') {
             const Number plain = number(text, at);
             const bool is_plain = plain.digits > 0 && plain.finding == F_OK && ends_argument(text, plain.end);
@@ -287,7 +291,7 @@ static int64_t cycle_call(Scan *scan, Evaluation *e, int64_t i, int64_t number_o
 /* Write what the statement makes whose name stands from i to end. */
 static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
-    const int32_t kind = statement_kind(scan, i, end);
+    const int32_t kind = kind_of(scan, i, end);
     const int64_t behind = behind_blanks(text, end);
     const bool is_assigned = stands_at(text, behind, '=');
     switch (kind < 0 ? -1 : kind % D_KIND_STEP) {
@@ -302,6 +306,11 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
             return assigned(scan, e, 'P', behind + 1, line, 1.0);
         break;
     case D_JUMP: return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
+    case D_DEFINE: return e == NULL ? NEEDS_LINE : define_variables(e, end);
+    case D_VARIABLE:
+        if (is_assigned)
+            return e == NULL ? NEEDS_LINE : assign_variable(e, kind / D_KIND_STEP, i, behind + 1);
+        break;
     case D_MESSAGE:
         if (e != NULL)
             return refuse(scan, e, i, line, DR_REASON_MESSAGE);
@@ -319,7 +328,13 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
     case D_SHIFT:
         put(scan, kind / D_KIND_STEP == 0 ? D_SHIFT_SET : D_SHIFT_ADD, 0.0, line);
         return end;
-    case D_TURN: put(scan, kind / D_KIND_STEP == 0 ? D_TURN_SET : D_TURN_ADD, 0.0, line); return end;
+    case D_APPROACH: put(scan, kind / D_KIND_STEP == 0 ? D_APPROACH_CONTOUR : D_APPROACH_NORMAL, 0.0, line); return end;
+    case D_NAMED_ARC: put(scan, kind / D_KIND_STEP == 0 ? D_ARC_VIA : D_ARC_TANGENT, 0.0, line); return end;
+    case D_TURN: {
+        static const int MARK[] = {D_TURN_SET, D_TURN_ADD, D_MIRROR_SET, D_MIRROR_ADD};
+        put(scan, MARK[kind / D_KIND_STEP], 0.0, line);
+        return end;
+    }
     case D_MARKED:
         if (is_assigned)
             return assigned(scan, e, D_CORNER_ROUND + kind / D_KIND_STEP, behind + 1, line, 0.0);
@@ -328,8 +343,8 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
     case D_MODAL_CALL: put(scan, D_MODAL, 0.0, line); return end;
     case D_REFUSED: return refuse(scan, e, i, line, kind / D_KIND_STEP);
     }
-    if (stands_at(text, behind, ':')) { /* a label: jumps to it are refused */
-        put(scan, D_SKIPPED, 0.0, line);
+    if (stands_at(text, behind, ':')) {
+        put(scan, D_LABEL, 0.0, line);
         return behind + 1;
     }
     return refuse(scan, e, i, line, DR_REASON_FLOW);
@@ -338,7 +353,7 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
 /* Write the tool whose name opens at i, T="MILL10". */
 static int64_t named_tool(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
     const int64_t end = after_quotes(scan->text, i);
-    const int32_t kind = statement_kind(scan, i, end);
+    const int32_t kind = kind_of(scan, i, end);
     if (kind < 0)
         return refuse(scan, e, i, line, DR_REASON_TOOL_NAME);
     put(scan, 'T', kind / D_KIND_STEP, line);
@@ -365,6 +380,10 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
         if (behind != i + 2 || AT(text, i + 1) != '3')
             return refuse(scan, e, i, line, DR_REASON_VECTORS);
         put(scan, D_NEXT_VECTOR, 0.0, line);
+        return assigned(scan, e, letter, equals + 1, line, 0.0);
+    }
+    if (first_one && letter >= 'I' && letter <= 'K') {
+        put(scan, D_NEXT_VIA, 0.0, line);
         return assigned(scan, e, letter, equals + 1, line, 0.0);
     }
     if (letter == 'R' && numbered)

@@ -2,11 +2,15 @@
 
 #include "gcode/dialect_words.h"
 
+#include "gcode/cutter_settings.h"
 #include "gcode/cycles.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/rows.h"
+#include "gcode/settings.h"
+#include "gcode/tool_lengths.h"
 
+static const double OFFSET_SLACK_MM = 1e-3; /* rounding of an offset in three decimals */
 static const double LEAST = 0.001, LEAST_INCH = 0.0001, TURNS = -1.0, FULL_TURN_DEG = 360.0;
 
 static bool refuse(Block *b, int reason, double code) {
@@ -26,6 +30,17 @@ static bool in_inches(const Block *b) {
 static bool in_cycle(const Block *b) {
     const bool named = b->g[V_MOTION] >= 0;
     return b->g[V_NON_MODAL] != V_G4 && is_cycle(named ? b->g[V_MOTION] / V_TENFOLD : b->state->motion);
+}
+
+static bool names_axis(const Block *b) {
+    return b->vector_named || b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
+}
+
+static bool changes_tool(const Block *b) {
+    for (int k = 0; k < V_M_CODES; k++)
+        if (b->m_codes[k] == V_M6)
+            return true;
+    return false;
 }
 
 /* TRANS and ATRANS are G52 with other axis words. */
@@ -69,10 +84,30 @@ static void take_corner(Block *b, uint8_t c, double value) {
     b->corner_value = value * (pointless && b->machine->points == D_THOUSANDTHS ? in_inches(b) ? LEAST_INCH : LEAST : 1.0);
 }
 
-/* Take ROT, AROT, or the angle of one. */
+/* Take I1=, J1= or K1=, the coordinate `axis` of a point on the arc. */
+bool take_via(Block *b, int axis, double value) {
+    const bool repeated = b->via_named >> axis & 1;
+    b->next_word = 0;
+    b->via_named |= 1 << axis;
+    b->via[axis] = value;
+    if (repeated)
+        report(b, F_REPEATED_WORD, (Says){.a = 'I' + axis});
+    return !repeated;
+}
+
+/* Take CIP or CT: an arc whose direction is found when it is carried out. */
+static void take_named_arc(Block *b, uint8_t c) {
+    if (b->next_word || b->named_arc || b->g[V_MOTION] >= 0)
+        refuse_statement(b, DR_REASON_NAMED_ARC);
+    b->named_arc = c;
+    b->g[V_MOTION] = V_MOTION_ARC_CCW * V_TENFOLD;
+}
+
+/* Take ROT, AROT, or the angle of one; MIRROR, AMIRROR. */
 static void take_turn_of_frame(Block *b, uint8_t c, double value) {
+    const bool mirrors = c == D_MIRROR_SET || c == D_MIRROR_ADD;
     if (b->next_word || (c == D_TURN_DEG ? !b->turn || b->turn_stated : b->turn != 0))
-        refuse_statement(b, DR_REASON_TURN);
+        refuse_statement(b, mirrors ? DR_REASON_MIRROR : DR_REASON_TURN);
     b->next_word = 0;
     if (c == D_TURN_DEG)
         b->turn_stated = true, b->turned_deg = value;
@@ -86,26 +121,41 @@ static void take_call(Block *b, uint8_t c, double value) {
         b->modal = true;
     else if (c == D_CYCLE && !b->cycle)
         b->cycle = (int32_t)value;
-    else if (c == D_ARGUMENT && b->arguments < MOST_ARGUMENTS)
+    else if (c == D_ARGUMENT && b->arguments < V_CYCLE_ARGUMENTS)
         b->argument[b->arguments++] = value;
     else
         refuse_statement(b, c == D_ARGUMENT ? DR_REASON_HEIGHTS : DR_REASON_CYCLE_BESIDE);
+}
+
+/* Take KONT and NORM: how a Sinumerik leads in. */
+static void take_approach(Block *b, bool along_contour) {
+    if (along_contour)
+        b->state->cutter_unread |= S_UNREAD_APPROACH;
+    else
+        b->state->cutter_unread &= ~S_UNREAD_APPROACH;
+    note(b, S_NOTE_STATEMENT, 0);
 }
 
 /* Take what the scanner has marked: the next word, or something that says nothing. */
 void take_dialect_mark(Block *b, uint8_t c, double value) {
     if (c >= D_CORNER_ROUND && c <= D_CORNER_LENGTH)
         take_corner(b, c, value);
-    else if (c == D_TURN_SET || c == D_TURN_ADD || c == D_TURN_DEG)
+    else if (c == D_TURN_SET || c == D_TURN_ADD || c == D_TURN_DEG || c == D_MIRROR_SET || c == D_MIRROR_ADD)
         take_turn_of_frame(b, c, value);
+    else if (c == D_ARC_VIA || c == D_ARC_TANGENT)
+        take_named_arc(b, c);
     else if (c >= D_CYCLE && c <= D_MODAL)
         take_call(b, c, value);
     else if (c == D_SHIFT_SET || c == D_SHIFT_ADD)
         take_shift(b, c);
     else if (c == D_TIP_ON || c == D_TIP_OFF || c == D_OTHER_TIP)
         take_tip(b, c);
-    else if (b->next_word == D_NEXT_VECTOR) /* A3=AC(1) */
+    else if (b->next_word == D_NEXT_VECTOR || b->next_word == D_NEXT_VIA) /* A3=AC(1) */
         refuse_statement(b, DR_REASON_VALUES);
+    else if (c == D_LABEL)
+        return; /* it alone keeps its line among the words, for jumps to it */
+    else if (c == D_APPROACH_CONTOUR || c == D_APPROACH_NORMAL)
+        take_approach(b, c == D_APPROACH_CONTOUR);
     else if (c == D_SKIPPED)
         note(b, S_NOTE_STATEMENT, 0);
     else
@@ -136,6 +186,9 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
     } else if (code == D_CODE_TURN || (code == D_CODE_TURN_OFF && b->state->turned_deg != 0.0)) {
         *good = b->turn == 0 || refuse(b, DR_REASON_TURN, (double)written);
         b->turn = code == D_CODE_TURN ? D_TURN_SET : D_TURN_OFF;
+    } else if (code == D_CODE_MIRROR || code == D_CODE_MIRROR_OFF) {
+        *good = b->turn == 0 || refuse(b, DR_REASON_MIRROR, (double)written);
+        b->turn = code == D_CODE_MIRROR ? D_MIRROR_SET : D_MIRROR_OFF;
     } else if (code == D_CODE_TURN_OFF) {
         note(b, S_NOTE_CODE, (int32_t)written);
     } else if (code == D_CODE_OFFSET) {
@@ -146,6 +199,12 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
         b->offset_code = (int32_t)written;
     } else if (code == D_CODE_NO_OFFSET) {
         b->state->zero_in_doubt = S_ZERO_OFF;
+    } else if (code == D_CODE_CORNER_ARC) {
+        b->state->cutter_unread &= ~S_UNREAD_CORNERS;
+        note(b, S_NOTE_CODE, (int32_t)written);
+    } else if (code == D_CODE_CORNER_MEETING) {
+        b->state->cutter_unread |= S_UNREAD_CORNERS;
+        note(b, S_NOTE_CODE, (int32_t)written);
     } else if (code == D_CODE_EXACT) {
         b->exact_once = true;
     } else if (code <= D_CODE_REFUSED) {
@@ -219,23 +278,48 @@ static bool read_dwell(Block *b) {
 
 /* D0 ends the tool's length and D1 begins it. */
 static bool read_edge(Block *b) {
-    const int d = 'A' + 3 - 'A';
-    if (!b->has[d])
+    const State *s = b->state;
+    if (!b->has[V_WORD_D])
         return true;
-    b->has[d] = false;
-    if (b->word[d] != 0.0 && b->word[d] != 1.0)
+    b->has[V_WORD_D] = false;
+    if (b->word[V_WORD_D] != 0.0 && b->word[V_WORD_D] != 1.0)
         return refuse_statement(b, DR_REASON_EDGE);
-    b->g[V_LENGTH_OFFSET] = b->word[d] == 0.0 ? V_G49 : V_G43;
+    if (b->word[V_WORD_D] == 1.0 && !isnan(s->length_offset) && s->offset_tool == s->tool && !changes_tool(b))
+        return true; /* it is in force */
+    b->g[V_LENGTH_OFFSET] = b->word[V_WORD_D] == 0.0 ? V_G49 : V_G43;
+    return true;
+}
+
+/* G10 L10 and L11 are length and wear of a tool's length, L12 and L13 of its radius or diameter: what is set has to be
+   that of the cell, as the robot's $TOOL is. */
+static bool read_tool_offset(Block *b, double l) {
+    enum { LENGTH = 10, SIZE = 12 };
+    const Machine *m = b->machine;
+    const int32_t tool = whole(b->word[V_WORD_P]);
+    const double value_mm = b->word[V_WORD_R] * (in_inches(b) ? U_MM_PER_INCH : 1.0);
+    const bool size = l >= SIZE, wear = l != LENGTH && l != SIZE;
+    const double of_radius_mm = m->d_holds == D_D_IS_DIAMETER ? value_mm : 2.0 * value_mm;
+    const double known_mm = size ? diameter_of(m, tool) : length_of(m, tool), given_mm = size ? of_radius_mm : value_mm;
+    const bool states = m->d_holds != D_D_IS_TOOL || !size;
+    if (tool == NOT_WHOLE || !b->has[V_WORD_R] || !states ||
+        (wear || (size && m->d_holds == D_D_IS_WEAR) ? value_mm != 0.0 : !(fabs(known_mm - given_mm) <= OFFSET_SLACK_MM)))
+        return refuse(b, DR_REASON_TOOL_OFFSET, V_G10);
+    note(b, S_NOTE_CODE, V_G10);
+    b->g[V_NON_MODAL] = -1;
+    b->has[V_WORD_L] = b->has[V_WORD_P] = b->has[V_WORD_R] = false;
     return true;
 }
 
 /* G10 of a Fanuc sets a work offset as LinuxCNC does, where it is absolute; its other uses are the control's own. */
 static bool read_g10(Block *b) {
-    const double p = b->word[V_WORD_P];
+    enum { FIRST_OF_TOOL = 10, LAST_OF_TOOL = 13 };
+    const double p = b->word[V_WORD_P], l = b->word[V_WORD_L];
     const int32_t counts = 1 << V_WORD_P | 1 << V_WORD_L;
     const bool absolute = b->g[V_DISTANCE] >= 0 ? b->g[V_DISTANCE] == V_G90 : b->state->absolute != 0;
     const bool offset = b->has[V_WORD_L] && b->word[V_WORD_L] == V_L_OFFSET && b->has[V_WORD_P] && is_whole(p) && p >= 1.0 && p <= 6.0;
     b->pointless &= ~counts;
+    if (absolute && b->has[V_WORD_L] && is_whole(l) && l >= FIRST_OF_TOOL && l <= LAST_OF_TOOL && b->has[V_WORD_P] && !names_axis(b))
+        return (b->pointless == 0 || read_pointless(b)) && read_tool_offset(b, l);
     return (offset && absolute && !b->has[V_WORD_R]) || refuse(b, DR_REASON_G10, V_G10);
 }
 
@@ -367,17 +451,10 @@ static bool read_vector(Block *b) {
 static bool moves_zero(const Block *b) {
     if (b->g[V_WORK_OFFSET] >= 0 || b->g[V_LENGTH_OFFSET] >= 0 || b->g[V_NON_MODAL] >= 0)
         return true;
-    for (int k = 0; k < V_M_CODES; k++)
-        if (b->m_codes[k] == V_M6)
-            return true;
-    return false;
+    return changes_tool(b);
 }
 
 /* --- all ------------------------------------------------------------------------------------------------ */
-
-static bool names_axis(const Block *b) {
-    return b->vector_named || b->has[V_WORD_X] || b->has[V_WORD_Y] || b->has[V_WORD_Z];
-}
 
 /* A control may drop its work offset where the transformation is switched; report the first block that needs it. */
 static bool is_zero_sure(Block *b) {
@@ -399,7 +476,10 @@ static bool use_harmless_words(Block *b) {
     return true;
 }
 
+/* Keep the D that G41 and G42 take; alone it says nothing to this robot. */
 static void leave_out_idle_words(Block *b) {
+    if (b->machine->d_holds && b->has[V_WORD_D])
+        b->state->cutter_d = whole(b->word[V_WORD_D]);
     for (int index = 0; index < V_LETTERS; index++)
         b->has[index] = b->has[index] && !(b->machine->idle_letters & 1 << index);
 }
@@ -433,6 +513,8 @@ bool to_core_words(Block *b) {
         good = is_zero_sure(b) && good;
     if ((b->has[V_WORD_RADIUS] || b->has[V_WORD_ANGLE]) && b->machine->programs != D_PROGRAMS_LINUXCNC)
         good = refuse_statement(b, DR_REASON_POLAR);
+    if (b->via_named && b->named_arc != D_ARC_VIA)
+        good = refuse_statement(b, DR_REASON_NAMED_ARC);
     if (b->harmless)
         good = use_harmless_words(b) && good;
     return good;

@@ -6,6 +6,7 @@
 #include "gcode/block.h"
 
 void take_dialect_mark(Block *b, uint8_t c, double value);
+bool take_via(Block *b, int axis, double value);
 bool take_component(Block *b, int axis, double value);
 void say_of_word(Block *b, int index);
 int32_t core_code(Block *b, int64_t written, bool *good);

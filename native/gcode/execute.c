@@ -83,6 +83,11 @@ EXPORT int64_t gcode_execute(Machine *machine, Program *program, Bytes letter, F
     Run run = {.machine = machine, .program = program, .course = course};
     course->wanted = NOTHING_WANTED;
     while (from < letter.rows && !machine->state.at->ended && !course->is_stopped) {
+        if (frame_of(&run)->until == from && from > 0) {
+            run.word = from;
+            from = end_section(&run);
+            continue;
+        }
         int64_t to = from + 1;
         while (to < letter.rows && AT(line, to) == AT(line, from))
             to++;

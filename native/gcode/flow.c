@@ -9,6 +9,7 @@
 #include "gcode/reporting.h"
 #include "gcode/saved_modes.h"
 #include "gcode/settings.h"
+#include "gcode/siemens_flow.h"
 #include "gcode/siemens_values.h"
 
 /* --- the end of a program that cannot go on ------------------------------------------------------------- */
@@ -58,13 +59,14 @@ double bracket_value(Evaluation *e, int64_t *i) {
     return value_at(e, i);
 }
 
-/* Find the value of the only bracket of an O-line; without one the program stops. */
+/* Find the value of the only bracket of an O-line, or of a Sinumerik's condition; without one the program stops. */
 static bool only_value(Run *run, const MarkedLine *marked, double *value) {
+    const bool siemens = run->program->language == D_PROGRAMS_SINUMERIK;
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
     e.is_condition = marked->kind == P_KIND_IF || marked->kind == P_KIND_ELSEIF;
-    *value = bracket_value(&e, &i);
-    if (line_ends(&e, i))
+    *value = siemens ? siemens_value(&e, &i) : bracket_value(&e, &i);
+    if (siemens ? siemens_line_ends(&e, i) : line_ends(&e, i))
         return true;
     stop_wrong(run, &e, marked->start, 0);
     return false;
@@ -75,7 +77,10 @@ static bool only_value(Run *run, const MarkedLine *marked, double *value) {
 /* Go on at a word: repeat loops that it is outside of are over. */
 int64_t jump(Run *run, int64_t word) {
     Course *at = run->course;
-    const int32_t base = frame_of(run)->repeats;
+    const Frame *frame = frame_of(run);
+    const int32_t base = frame->repeats;
+    if (frame->until > 0 && (word < frame->entry || word > frame->until))
+        return stop_at_fault(run, PF_FAULT_SECTION, word);
     while (at->repeats > base) {
         const Repeat *inner = &AT(run->program->repeats, at->repeats - 1);
         if (word >= inner->word && word < inner->end)
@@ -110,25 +115,12 @@ static int64_t next_branch(Run *run, const MarkedLine *marked, int64_t next) {
     return next;
 }
 
-/* IF condition GOTOF label, of a Sinumerik. */
-static int64_t siemens_if(Run *run, const MarkedLine *marked, int64_t next) {
-    Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
-    int64_t i = marked->expression;
-    const double test = siemens_value(&e, &i);
-    i = after_blanks(run->program->text, i, e.end);
-    if (e.finding == F_OK && after_word(run->program->text, i, e.end, "goto") == i)
-        wrong(&e, F_EXPRESSION, PF_SIEMENS_GOTO, 0.0, least(i, e.end - 1));
-    if (e.finding != F_OK)
-        return stop_wrong(run, &e, marked->start, next);
-    return test != 0.0 ? jump(run, marked->target) : next;
-}
-
 static int64_t loop(Run *run, const MarkedLine *marked, int64_t next) {
     double test;
     if (!only_value(run, marked, &test))
         return next;
-    const bool leaves = marked->kind == P_KIND_WHILE ? test == 0.0 : test != 0.0;
-    return leaves ? jump(run, marked->target) : next; /* behind endwhile, or back to do */
+    const bool jumps = marked->kind == P_KIND_DO_WHILE ? test != 0.0 : test == 0.0;
+    return jumps ? jump(run, marked->target) : next; /* behind endwhile; back to do, or to REPEAT of UNTIL */
 }
 
 static int64_t repeat(Run *run, const MarkedLine *marked, int64_t next) {
@@ -231,6 +223,7 @@ int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int6
     frame->return_to = next;
     frame->times = times - 1;
     frame->entry = subprogram->entry;
+    frame->until = 0;
     frame->is_program = subprogram->is_program;
     frame->has_arguments = arguments != NULL;
     frame->main_line = main_line;
@@ -371,6 +364,17 @@ int64_t end_program(Run *run, bool is_alone, int64_t next) {
     return enter(run, frame);
 }
 
+/* The end of a section that REPEAT repeats: once more, or go on behind REPEAT. */
+int64_t end_section(Run *run) {
+    Frame *frame = frame_of(run);
+    if (frame->times <= 0)
+        return leave(run);
+    run->course->changes++;
+    frame->times--;
+    run->course->repeats = frame->repeats;
+    return enter(run, frame);
+}
+
 /* endsub and return, with a value or without. */
 static int64_t return_from(Run *run, const MarkedLine *marked, int64_t next) {
     Course *at = run->course;
@@ -422,6 +426,7 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_ELSE: return next_branch(run, marked, next);
     case P_KIND_ENDIF: run->course->is_testing = 0; return next;
     case P_KIND_WHILE:
+    case P_KIND_UNTIL:
     case P_KIND_DO_WHILE: return loop(run, marked, next);
     case P_KIND_JUMP: return jump(run, marked->target);
     case P_KIND_REPEAT: return repeat(run, marked, next);
@@ -434,6 +439,9 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_MACRO_IF: return macro_if(run, marked, next);
     case P_KIND_MACRO_WHILE: return macro_while(run, marked, next);
     case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
+    case P_KIND_FOR: return begin_counting(run, marked, next);
+    case P_KIND_ENDFOR: return count_on(run, marked, next);
+    case P_KIND_SECTION: return repeat_section(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

@@ -33,6 +33,7 @@ bool is_ready(Run *run, int64_t row);
 int64_t call_lines(Run *run, int64_t word, int64_t times, int64_t next);
 int64_t call(Run *run, int64_t row, const double *arguments, int64_t given, int64_t times, int64_t next);
 int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, int64_t next);
+int64_t end_section(Run *run);
 int64_t flow(Run *run, const MarkedLine *marked, int64_t next);
 int64_t call_program(Run *run, const Words *words, int64_t from, int64_t to, int64_t next);
 int64_t end_program(Run *run, bool is_alone, int64_t next);

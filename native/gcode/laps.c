@@ -13,7 +13,7 @@
 /* Return the state without what only tells of the way so far. */
 static State without_records(const State *state) {
     State s = *state;
-    s.blocks = s.cutter_rows_removed = s.held_events = 0;
+    s.blocks = s.cutter_rows_removed = s.held_events = s.arc_end_rows = 0;
     s.arcs = s.misfits = s.misfits_other_centre = s.misfits_reversed = s.misfits_exchanged = s.spirals = 0;
     s.largest_mm = s.spiral_start = s.spiral_end = 0.0;
     s.spiral_line = 0;

@@ -213,7 +213,7 @@ static void stop(Block *b) {
 
 /* Execute a block whose words are sorted; return false where there is no room for its rows. */
 static bool execute(Block *b) {
-    if (b->modal || b->cycle)
+    if (b->modal || (b->cycle && b->cycle != V_CYCLE_BEHIND))
         return cycle_call(b);
     if ((b->turn && !turn_frame(b)) || !may_stay_turned(b))
         return true;
@@ -260,6 +260,10 @@ static bool execute(Block *b) {
         if (!move(b) || !modal_cycle(b))
             return false;
     }
+    if (b->cycle == V_CYCLE_BEHIND && !hole_behind(b))
+        return false;
+    const bool across = moves && (b->has[V_WORD_X] || b->has[V_WORD_Y] || names_centre_alone(b));
+    b->state->cutter_idle = across ? 0 : b->state->cutter_idle + 1;
     report_unused(b);
     stop(b);
     return true;

@@ -65,6 +65,8 @@ static bool straight(Block *b, bool by_machine) {
         if (finding != F_OK)
             report_speed(b, finding);
     }
+    if (s->cutter_mode & S_CUTTER_BESIDE && b->machine->lead && !by_machine && !lead_out(b, to_mm, mm_s))
+        return false;
     s->cutter_mode &= ~S_CUTTER_BESIDE;
     if (compensates(s)) {
         learn(b);

@@ -2,20 +2,17 @@
 
 #include "gcode/offset_path.h"
 
-/* A turn of less than this (rad) is no corner: LinuxCNC's bound. */
-static const double SMALLEST_CORNER_RAD = 0.05;
-
 /* Return what kind of corner a path makes that leaves direction `before` for `after`.
 
    A path that turns back on itself is an outside corner, unless the tool would go around an arc to get there
    (a cusp between an arc and what touches it). */
-Corner corner_between(Point before, Point after, int side, bool cusp_is_inside) {
+Corner corner_between(Point before, Point after, int side, bool cusp_is_inside, double smallest_rad) {
     double away_rad = side * atan2(cross(after, before), dot(after, before));
     if (away_rad < SMALLEST_CORNER_RAD - PI)
         away_rad += 2.0 * PI;
-    if (away_rad < -SMALLEST_CORNER_RAD || (cusp_is_inside && away_rad > PI - SMALLEST_CORNER_RAD))
+    if (away_rad < -smallest_rad || (cusp_is_inside && away_rad > PI - SMALLEST_CORNER_RAD))
         return INSIDE;
-    return away_rad > SMALLEST_CORNER_RAD ? OUTSIDE : SMOOTH;
+    return away_rad > smallest_rad ? OUTSIDE : SMOOTH;
 }
 
 static bool lines_meet(const Piece *a, const Piece *b, Point *at) {

@@ -14,6 +14,9 @@ typedef struct {
     double radius_mm;
 } Piece;
 
+/* A turn of less than this (rad) is no corner: LinuxCNC's bound. */
+static const double SMALLEST_CORNER_RAD = 0.05;
+
 typedef enum { SMOOTH, OUTSIDE, INSIDE } Corner;
 
 static inline Point plus(Point a, double factor, Point b) {
@@ -29,7 +32,7 @@ static inline Point unit(Point a) {
     return (Point){a.u / length, a.v / length};
 }
 
-Corner corner_between(Point before, Point after, int side, bool cusp_is_inside);
+Corner corner_between(Point before, Point after, int side, bool cusp_is_inside, double smallest_rad);
 bool meeting_point(const Piece *before, const Piece *after, int side, Point *at);
 double angle_past(Point centre, int turn, Point from, Point to);
 

@@ -16,8 +16,9 @@ void unrotate(const State *s, double mm[3]) {
     const double x = mm[0] - s->pivot_mm[0], y = mm[1] - s->pivot_mm[1];
     if (!s->rotated)
         return;
-    mm[0] = s->pivot_mm[0] + (s->rotation_cos * x + s->rotation_sin * y);
-    mm[1] = s->pivot_mm[1] + (s->rotation_cos * y - s->rotation_sin * x);
+    const double u = s->rotation_cos * x + s->rotation_sin * y, v = s->rotation_cos * y - s->rotation_sin * x;
+    mm[0] = s->pivot_mm[0] + (s->flipped & MIRROR_X ? -u : u);
+    mm[1] = s->pivot_mm[1] + (s->flipped & MIRROR_Y ? -v : v);
 }
 
 void stand_with_tip_at(State *s, const double tip_mm[3]) {
@@ -49,20 +50,21 @@ void take_offsets(Machine *machine) {
     const double *offset_mm = offset_of(machine, s->work_offset);
     const double deg = s->turned_deg != 0.0 ? s->turned_deg : offset_mm[OFFSET_ROTATION];
     const double angle = in_rad(deg), rotation_cos = cos(angle), rotation_sin = sin(angle);
-    const bool rotates = deg != 0.0;
+    const bool turned = s->turned_deg != 0.0 || s->mirrored, rotates = deg != 0.0 || turned;
     double tip_mm[3];
     tip_position(s, tip_mm);
     for (int axis = 0; axis < 3; axis++)
         s->base_mm[axis] = offset_mm[axis] + s->shift_mm[axis];
     if (!rotates && !s->rotated)
         return;
-    if (!s->rotated || !rotates || rotation_cos != s->rotation_cos || rotation_sin != s->rotation_sin)
+    if (!s->rotated || !rotates || s->mirrored != s->flipped || rotation_cos != s->rotation_cos || rotation_sin != s->rotation_sin)
         s->known_x = s->known_y = s->known_x && s->known_y; /* one axis of the other frame alone is not known */
     s->rotated = rotates;
+    s->flipped = s->mirrored;
     s->rotation_cos = rotation_cos;
     s->rotation_sin = rotation_sin;
     for (int axis = 0; axis < 2; axis++)
-        s->pivot_mm[axis] = s->turned_deg != 0.0 ? s->base_mm[axis] + s->turned_about_mm[axis] : offset_mm[axis];
+        s->pivot_mm[axis] = turned ? s->base_mm[axis] + s->turned_about_mm[axis] : offset_mm[axis];
     stand_with_tip_at(s, tip_mm);
 }
 
@@ -122,7 +124,7 @@ static void shift_by_words(Block *b, bool by_position) {
     if (by_position)
         report_unknown(b, unknown_axes(b, false), stays);
     if (b->shift == D_SHIFT_SET) /* TRANS stands for the whole frame of the program */
-        s->turned_deg = 0.0;
+        s->turned_deg = 0.0, s->mirrored = 0;
     note_moved(b, by_position ? S_NOTE_SHIFT : S_NOTE_LOCAL, s->shift_mm, shift_mm);
     for (int axis = 0; axis < 3; axis++)
         s->shift_mm[axis] = s->shift_kept_mm[axis] = shift_mm[axis];

@@ -1,6 +1,6 @@
 /* Where the zero of the programmed numbers lies: work offset, its rotation, and the shift of G52 and G92.
 
-   tip = R (programmed + shift) + work offset. The state keeps programmed + shift + work offset, which is the tip
+   tip = R (programmed + shift) + work offset, R being a rotation about Z, or a mirror and a rotation. The state keeps programmed + shift + work offset, which is the tip
    as it would be without the rotation R; only rows, machine coordinates and changes of R see the tip itself. */
 
 #ifndef GCODE_OFFSETS_H
@@ -10,9 +10,12 @@
 
 enum { OFFSET_ROTATION = 3 }; /* column of the work offsets, degrees about Z */
 
-/* Rotate a place about the work offset in force. */
+enum { MIRROR_X = 1, MIRROR_Y = 2 };
+
+/* Mirror a place at the pivot of the zero in force, and rotate it about that. */
 static inline void rotate(const State *s, double mm[3]) {
-    const double x = mm[0] - s->pivot_mm[0], y = mm[1] - s->pivot_mm[1];
+    const double x = s->flipped & MIRROR_X ? s->pivot_mm[0] - mm[0] : mm[0] - s->pivot_mm[0];
+    const double y = s->flipped & MIRROR_Y ? s->pivot_mm[1] - mm[1] : mm[1] - s->pivot_mm[1];
     mm[0] = s->pivot_mm[0] + (s->rotation_cos * x - s->rotation_sin * y);
     mm[1] = s->pivot_mm[1] + (s->rotation_sin * x + s->rotation_cos * y);
 }

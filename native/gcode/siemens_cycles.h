@@ -6,6 +6,7 @@
 #include "gcode/block.h"
 
 bool cycle_call(Block *block);
+bool hole_behind(Block *b);
 bool modal_cycle(Block *block);
 
 #endif

@@ -1,10 +1,12 @@
-/* R parameters and expressions of a Sinumerik: X=R1+5, R2=SIN(R3)*4.
+/* R parameters, variables and expressions of a Sinumerik: X=R1+5, R2=SIN(R3)*4, DEF REAL WIDTH=20.
 
    What is not named here ends the expression, and what then follows is refused with its line. One comparison stands in
-   a bracket: between comparisons the control has ranks that are easily taken for others. */
+   a bracket, and AND, OR, XOR take what is true or false: they go before comparisons on this control (SINUMERIK 840D sl,
+   Programming Manual, Job Planning: priority of the operations). */
 
 #include "gcode/siemens_values.h"
 
+#include "gcode/dialect_text.h"
 #include "gcode/expressions.h"
 #include "gcode/numbers.h"
 
@@ -29,37 +31,110 @@ static int64_t r_number(Evaluation *e, int64_t i, int64_t behind, int64_t place)
     return number < P_MOST_R ? number : 0;
 }
 
-static double r_value(Evaluation *e, int64_t number, int64_t place) {
-    const Program *program = e->program;
-    for (int64_t k = 0; k < program->course.at->assignments; k++)
-        if (AT(program->assignments, k).number == number)
-            return wrong(e, F_EXPRESSION, PF_SIEMENS_SAME_BLOCK, 0.0, place);
-    const double value = AT(program->parameters, number);
+static bool is_assigned_here(const Evaluation *e, int64_t number) {
+    for (int64_t k = 0; k < e->program->course.at->assignments; k++)
+        if (AT(e->program->assignments, k).number == number)
+            return true;
+    return false;
+}
+
+/* Return the value of an R parameter or a variable: an R that nothing has set is 0. */
+static double value_of(Evaluation *e, int64_t number, int64_t place) {
+    if (is_assigned_here(e, number))
+        return wrong(e, F_EXPRESSION, PF_SIEMENS_SAME_BLOCK, 0.0, place);
+    const double value = AT(e->program->parameters, number);
     if (!isnan(value))
         return value;
+    if (number >= P_FIRST_REAL)
+        return wrong(e, F_EXPRESSION, PF_SIEMENS_UNDEFINED, 0.0, place);
     note_unset(e, number);
     return 0.0;
+}
+
+/* Return a value as the type of its variable holds it. */
+static double of_type(int64_t number, double value) {
+    if (number < P_FIRST_INT)
+        return value;
+    return number < P_FIRST_BOOL ? floor(value + 0.5) : value != 0.0;
+}
+
+/* Keep that an R parameter or a variable gets a value. */
+static void keep(Evaluation *e, int64_t number, double value, int64_t place) {
+    Course *at = e->program->course.at;
+    if (is_assigned_here(e, number))
+        wrong(e, F_EXPRESSION, PF_SIEMENS_SAME_BLOCK, 0.0, place);
+    if (e->finding == F_OK)
+        AT(e->program->assignments, at->assignments++) = (Assignment){NO_NAME, number, of_type(number, value)};
 }
 
 /* R1=..., whose R stands at `place`, with its digits before `behind` and its value from `value` on; return the place
    behind. */
 int64_t assign_r(Evaluation *e, int64_t place, int64_t behind, int64_t value) {
-    Course *at = e->program->course.at;
     const int64_t number = r_number(e, place + 1, behind, place);
-    for (int64_t k = 0; k < at->assignments; k++)
-        if (AT(e->program->assignments, k).number == number)
-            wrong(e, F_EXPRESSION, PF_SIEMENS_SAME_BLOCK, 0.0, place);
     const double result = siemens_value(e, &value);
-    if (e->finding == F_OK)
-        AT(e->program->assignments, at->assignments++) = (Assignment){NO_NAME, number, result};
+    keep(e, number, result, place);
     return value;
+}
+
+/* --- variables ------------------------------------------------------------------------------------------ */
+
+/* Return the number of the R parameter or variable whose name stands at i, and go behind it; -1 for none. */
+static int64_t variable_at(Evaluation *e, int64_t *i) {
+    const Bytes text = e->program->text;
+    const int64_t place = *i;
+    int64_t behind = place;
+    if (place + 1 < e->end && (AT(text, place) & ~CH_CASE_BIT) == 'R' && is_digit(AT(text, place + 1))) {
+        for (behind = place + 1; behind < e->end && is_digit(AT(text, behind)); behind++)
+            ;
+        *i = behind;
+        return r_number(e, place + 1, behind, place);
+    }
+    while (behind < e->end && is_of_name(AT(text, behind)))
+        behind++;
+    const int32_t kind = statement_kind(text, e->program->statement_names, e->program->statement_kinds, place, behind);
+    if (behind == place || kind < 0 || kind % D_KIND_STEP != D_VARIABLE)
+        return -1;
+    *i = behind;
+    return kind / D_KIND_STEP;
+}
+
+/* WIDTH=..., whose number is known and whose value stands at `value`; return the place behind. */
+int64_t assign_variable(Evaluation *e, int64_t number, int64_t place, int64_t value) {
+    const double result = siemens_value(e, &value);
+    keep(e, number, result, place);
+    return value;
+}
+
+/* DEF REAL WIDTH=20, DEPTH: each variable of the line from i on gets its value, 0 where none is stated; return the place
+   behind. */
+int64_t define_variables(Evaluation *e, int64_t i) {
+    const Bytes text = e->program->text;
+    for (i = behind_blanks(e, i); i < e->end && is_letter(AT(text, i)); i++)
+        ; /* the type */
+    do {
+        const int64_t place = i = behind_blanks(e, i), number = variable_at(e, &i);
+        double value = 0.0;
+        if (number < P_FIRST_REAL)
+            return wrong(e, F_EXPRESSION, PF_SIEMENS_DEF, 0.0, least(place, e->end - 1)), e->end;
+        i = behind_blanks(e, i);
+        if (stands_at(e, i, '=')) {
+            i++;
+            value = siemens_value(e, &i);
+        }
+        keep(e, number, value, place);
+        i = behind_blanks(e, i);
+    } while (e->finding == F_OK && stands_at(e, i++, ','));
+    i--;
+    if (e->finding == F_OK && i < e->end && AT(text, i) != ';')
+        wrong(e, F_EXPRESSION, PF_SIEMENS_DEF, 0.0, i);
+    return e->end;
 }
 
 /* --- functions ------------------------------------------------------------------------------------------ */
 
-typedef enum { SIN, COS, TAN, ASIN, ACOS, SQRT, ABS, TRUNC, ROUND, LN, EXP, POT, ATAN2, FUNCTIONS } Function;
-static const char *const FUNCTION[] = {"sin", "cos", "tan",   "asin",  "acos", "sqrt", "abs",
-                                       "trunc", "round", "ln", "exp", "pot",  "atan2"};
+typedef enum { SIN, COS, TAN, ASIN, ACOS, SQRT, ABS, TRUNC, ROUND, LN, EXP, POT, ATAN2, MINVAL, MAXVAL, FUNCTIONS } Function;
+static const char *const FUNCTION[] = {"sin",   "cos", "tan", "asin", "acos",  "sqrt",   "abs",   "trunc",
+                                       "round", "ln",  "exp", "pot",  "atan2", "minval", "maxval"};
 
 /* Return the function whose name and ( stand at i, and go behind the (; FUNCTIONS for none. */
 static Function function_at(const Evaluation *e, int64_t *i) {
@@ -106,18 +181,31 @@ static void require(Evaluation *e, int64_t *i, uint8_t c, int fault) {
 static double call_at(Evaluation *e, int64_t *i, Function function, int64_t place) {
     const double first = expression(e, i);
     double second = 0.0;
-    if (function == ATAN2) {
-        require(e, i, ',', PF_SIEMENS_ATAN2);
+    if (function >= ATAN2) {
+        require(e, i, ',', PF_SIEMENS_TWO);
         if (e->finding == F_OK)
             second = expression(e, i);
     }
     require(e, i, ')', PF_SIEMENS_BRACKET);
     if (e->finding != F_OK)
         return 0.0;
-    return function == ATAN2 ? degrees(atan2(first + 0.0, second)) : function_of(e, function, first, place);
+    switch (function) {
+    case ATAN2: return degrees(atan2(first + 0.0, second));
+    case MINVAL: return lesser(first, second);
+    case MAXVAL: return greater(first, second);
+    default: return function_of(e, function, first, place);
+    }
 }
 
 /* --- values --------------------------------------------------------------------------------------------- */
+
+/* Return the place behind a name of small letters that stands at i, i where it does not. */
+static int64_t behind_keyword(const Evaluation *e, int64_t i, const char *name) {
+    int64_t k = i;
+    for (; *name && k < e->end && (AT(e->program->text, k) | CH_CASE_BIT) == (uint8_t)*name; name++)
+        k++;
+    return *name || (k < e->end && is_of_name(AT(e->program->text, k))) ? i : k;
+}
 
 static double unsigned_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
@@ -128,12 +216,13 @@ static double unsigned_at(Evaluation *e, int64_t *i) {
         require(e, i, ')', PF_SIEMENS_BRACKET);
         return value;
     }
-    if (*i + 1 < e->end && (AT(text, *i) & ~CH_CASE_BIT) == 'R' && is_digit(AT(text, *i + 1))) {
-        int64_t behind = *i + 1;
-        while (behind < e->end && is_digit(AT(text, behind)))
-            behind++;
-        *i = behind;
-        return r_value(e, r_number(e, place + 1, behind, place), place);
+    const int64_t number_of_variable = *i < e->end && is_of_name(AT(text, *i)) ? variable_at(e, i) : -1;
+    if (number_of_variable >= 0)
+        return value_of(e, number_of_variable, place);
+    const int64_t truth = behind_keyword(e, *i, "true"), lie = behind_keyword(e, *i, "false");
+    if (truth > *i || lie > *i) {
+        *i = most(truth, lie);
+        return truth > lie;
     }
     const Function function = *i < e->end && is_letter(AT(text, *i)) ? function_at(e, i) : FUNCTIONS;
     if (function != FUNCTIONS)
@@ -147,8 +236,24 @@ static double unsigned_at(Evaluation *e, int64_t *i) {
     return read.value;
 }
 
+/* Tell whether a value is true or false; it is wrong where it is neither. */
+static bool is_truth(Evaluation *e, double value, int64_t place) {
+    if (e->finding == F_OK && value != 0.0 && value != 1.0)
+        wrong(e, F_EXPRESSION, PF_SIEMENS_TRUTH, 0.0, least(place, e->end - 1));
+    return e->finding == F_OK;
+}
+
 static double value_behind_signs(Evaluation *e, int64_t *i) {
     bool negative = false;
+    const int64_t behind_not = behind_keyword(e, behind_blanks(e, *i), "not");
+    if (behind_not > behind_blanks(e, *i) && e->depth < MOST_DEPTH) {
+        const int64_t place = *i;
+        *i = behind_not;
+        e->depth++;
+        const double value = value_behind_signs(e, i);
+        e->depth--;
+        return is_truth(e, value, place) ? value == 0.0 : 0.0;
+    }
     for (*i = behind_blanks(e, *i); *i < e->end && is_sign(AT(e->program->text, *i)); *i = behind_blanks(e, *i + 1))
         negative ^= AT(e->program->text, *i) == '-';
     if (e->depth >= MOST_DEPTH)
@@ -159,18 +264,29 @@ static double value_behind_signs(Evaluation *e, int64_t *i) {
     return negative ? -value : value;
 }
 
+static double quotient(Evaluation *e, double left, double right, bool whole, int64_t place) {
+    if (right == 0.0 && e->finding == F_OK)
+        return wrong(e, F_EXPRESSION_VALUE, PF_DIVISION_BY_ZERO, 0.0, place);
+    return whole ? trunc(left / right) : left / right;
+}
+
+static double remainder_of(Evaluation *e, double left, double right, int64_t place) {
+    if (floor(left) != left || floor(right) != right)
+        return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_REMAINDER, floor(left) != left ? left : right, place);
+    return right == 0.0 ? wrong(e, F_EXPRESSION_VALUE, PF_DIVISION_BY_ZERO, 0.0, place) : fmod(left, right);
+}
+
 static double product(Evaluation *e, int64_t *i) {
     double left = value_behind_signs(e, i);
     while (e->finding == F_OK) {
         const int64_t place = behind_blanks(e, *i);
+        const int64_t div = behind_keyword(e, place, "div"), mod = behind_keyword(e, place, "mod");
         const bool times = stands_at(e, place, '*'), over = stands_at(e, place, '/');
-        if (!times && !over)
+        if (!times && !over && div == place && mod == place)
             break;
-        *i = place + 1;
+        *i = times || over ? place + 1 : most(div, mod);
         const double right = value_behind_signs(e, i);
-        if (over && right == 0.0 && e->finding == F_OK)
-            return wrong(e, F_EXPRESSION_VALUE, PF_DIVISION_BY_ZERO, 0.0, place);
-        left = times ? left * right : left / right;
+        left = times ? left * right : mod > place ? remainder_of(e, left, right, place) : quotient(e, left, right, !over, place);
     }
     return left;
 }
@@ -185,6 +301,27 @@ static double sum(Evaluation *e, int64_t *i) {
         *i = place + 1;
         const double right = product(e, i);
         left = plus ? left + right : left - right;
+    }
+    return left;
+}
+
+/* --- AND, XOR, OR --------------------------------------------------------------------------------------- */
+
+enum { MOST_RANK = 2 };
+
+/* AND goes before XOR, and that before OR. */
+static double joined(Evaluation *e, int64_t *i, int rank) {
+    static const char *const NAME[] = {"and", "xor", "or"};
+    double left = rank == 0 ? sum(e, i) : joined(e, i, rank - 1);
+    while (e->finding == F_OK) {
+        const int64_t place = behind_blanks(e, *i), behind = behind_keyword(e, place, NAME[rank]);
+        if (behind == place)
+            break;
+        *i = behind;
+        const double right = rank == 0 ? sum(e, i) : joined(e, i, rank - 1);
+        if (!is_truth(e, left, place) || !is_truth(e, right, place))
+            return 0.0;
+        left = rank == 0 ? left * right : rank == 1 ? left != right : greater(left, right);
     }
     return left;
 }
@@ -220,12 +357,12 @@ static double compared(Comparison comparison, double a, double b) {
 }
 
 static double expression(Evaluation *e, int64_t *i) {
-    const double left = sum(e, i);
+    const double left = joined(e, i, MOST_RANK);
     const int64_t place = *i;
     const Comparison comparison = e->finding == F_OK ? comparison_at(e, i) : NONE;
     if (comparison == NONE)
         return left;
-    const double right = sum(e, i), apart = fabs(left - right);
+    const double right = joined(e, i, MOST_RANK), apart = fabs(left - right);
     if (e->finding == F_OK && apart != 0.0 && apart < NEAR * greater(1.0, greater(fabs(left), fabs(right))))
         return wrong(e, F_EXPRESSION_VALUE, PF_MACRO_NEAR, apart, place);
     int64_t more = *i;
@@ -241,4 +378,40 @@ double siemens_value(Evaluation *e, int64_t *i) {
     if (isnan(value) || isinf(value))
         return wrong(e, F_EXPRESSION_VALUE, isnan(value) ? PF_NOT_A_NUMBER : PF_INFINITE, 0.0, place);
     return value;
+}
+
+/* --- FOR ------------------------------------------------------------------------------------------------ */
+
+/* Read the head of a loop from i on, R1=1 TO 5: the number of the variable, -1 for none, its first value and its last. */
+int64_t loop_head(Evaluation *e, int64_t i, double *first, double *last) {
+    const int64_t place = i = behind_blanks(e, i), number = variable_at(e, &i);
+    const bool counts = number >= 0 && (number < P_FIRST_REAL || (number >= P_FIRST_INT && number < P_FIRST_BOOL));
+    i = behind_blanks(e, i);
+    if (!counts || !stands_at(e, i, '='))
+        return (int64_t)wrong(e, F_EXPRESSION, PF_SIEMENS_FOR, 0.0, least(place, e->end - 1)) - 1;
+    i++;
+    *first = of_type(number, siemens_value(e, &i));
+    i = behind_blanks(e, i);
+    const int64_t to = behind_keyword(e, i, "to");
+    if (e->finding == F_OK && to == i)
+        wrong(e, F_EXPRESSION, PF_SIEMENS_FOR, 0.0, least(i, e->end - 1));
+    i = to;
+    if (e->finding == F_OK)
+        *last = siemens_value(e, &i);
+    siemens_line_ends(e, i);
+    return number;
+}
+
+/* Set the variable of a loop, and tell its value. */
+double set_counter(Evaluation *e, int64_t number, double value) {
+    keep(e, number, value, 0);
+    return of_type(number, value);
+}
+
+/* Tell whether nothing but a comment stands from i on; else that is wrong. */
+bool siemens_line_ends(Evaluation *e, int64_t i) {
+    i = behind_blanks(e, i);
+    if (e->finding == F_OK && i < e->end && AT(e->program->text, i) != ';')
+        wrong(e, F_EXPRESSION, PF_SIEMENS_BEHIND, 0.0, i);
+    return e->finding == F_OK;
 }

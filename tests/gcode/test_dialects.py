@@ -185,7 +185,6 @@ def test_a_message_is_kept():
             "TRANS X10 TRANS Y5",
             "TRANS X=IC(5)",
             "AROT",
-            "MIRROR X0",
             "G70",
             "G41",
             "G26 S5000",
@@ -238,7 +237,7 @@ def test_counted_words_are_the_points_they_lead_to(steps):
     )
 
 
-@pytest.mark.parametrize("dialect", DIALECT_NAMES)
+@pytest.mark.parametrize("dialect", DIALECT_NAMES[:-1])
 @pytest.mark.parametrize(
     "text",
     [
@@ -252,12 +251,10 @@ def test_conversational_programs_are_one_clear_sentence(dialect, text):
         read(text, dialect)
     (issue,) = refused.value.issues
     assert "Heidenhain" in issue.message
-    assert "export" in issue.remedy
+    assert issue.remedy == "read it with --dialect heidenhain"
 
 
-def test_heidenhain_as_a_dialect_says_the_same():
-    with pytest.raises(NotUnderstoodError, match="Heidenhain"):
-        read("G21\n", "heidenhain")
+def test_a_dialect_that_is_none_is_told_which_there_are():
     with pytest.raises(NotUnderstoodError, match="fanuc-calculator"):
         read("G21\n", "okuma")
 
@@ -330,10 +327,10 @@ def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
         ("G1 X5 CHR=1 F100", "sinumerik", "corner"),
         ("G83 X5. Z-5. R1. Q2. F100 L0", "fanuc", "drill nothing"),
         ("G81 X5. Z-5. R1. F100 K0", "fanuc", "drill nothing"),
-        ("G10 L10 P1 R5.", "fanuc", "G10 L2 P1 to P6"),
+        ("G10 L10 P1 R5.", "fanuc", "what the cell states"),
         ("G10 L2 P0 X5.", "fanuc", "G10 L2 P1 to P6"),
         ("G41 D1 G1 X5. F100", "fanuc", "leads in"),
-        ("MCALL CYCLE83(10,0,2,-8)", "sinumerik", "cycle"),
+        ("MCALL CYCLE83(10,0,2,-8)", "sinumerik", "first depth"),
         ('T="MILL" D1', "sinumerik", "this name"),
     ],
 )

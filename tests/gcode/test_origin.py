@@ -15,7 +15,6 @@ MILL = (
 END = "G0 Z30.\nM5\nM30\n"
 FOREIGN = {
     "Okuma": "$SHAFT.MIN%\nO7\nG15 H2\nG0 X0 Y0\nG56 HA Z40\nG1 X5 F100\nM2\n",
-    "conversational": "0 BEGIN PGM A MM\n1 TOOL CALL 4 Z S12000\n2 L X+5 Y+1 R0 FMAX\n3 END PGM A MM\n",
     "DIN/ISO of a Heidenhain": "%PLATE G71 *\nN10 G30 G17 X+0 Y+0 Z-20*\nN20 G31 G90 X+100 Y+80 Z+0*\n"
     "N30 T4 G17 S1200*\nN40 G00 G40 G90 Z+50*\nN99999 %PLATE G71 *\n",
     "MillPlus": "%PM9001\nN9001 (PLATE)\nN1 G17 T1 M6\nN2 G0 X0 Y0 Z50\nN3 G1 X5 F100\nN4 M30\n",

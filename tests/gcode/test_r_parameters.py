@@ -128,8 +128,6 @@ def test_a_parameter_that_nothing_has_set_is_told():
         ("AB:\nGOTOF AB", ("o-word", 2)),
         ("GOTOB AB\nAB:", ("o-word", 1)),
         ("GOTOF R1", ("o-word", 1)),
-        ("R1=1\nIF R1==1\nX1\nENDIF", ("dialect-statement", 2)),
-        ("WHILE R1<5\nENDWHILE", ("dialect-statement", 1)),
         ('R1=1 MSG("A")', ("dialect-statement", 1)),
         ("R1=1\nX[1+1]", ("dialect-statement", 2)),
         ("R1=1\nX#1", ("dialect-statement", 2)),

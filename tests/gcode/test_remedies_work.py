@@ -89,6 +89,7 @@ REMEDIES = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(enc
 BEFORE = {
     "linuxcnc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
     "fanuc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0. Y0. Z0.\nF500\n",
+    "heidenhain": "0 BEGIN PGM P MM\n1 TOOL CALL 1 Z S8000 F500\n2 L X+0 Y+0 Z+0 R0 FMAX M3\n",
     "sinumerik": "G710 G90 G17 G94\nG54\nT1 M6\nD1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
 }
 
@@ -97,7 +98,7 @@ def outcome(entry, lines, cell):
     """Return the findings of some lines behind a head, and the last place (none if refused)."""
     dialect = entry.get("dialect", "linuxcnc")
     head = "G21 G90 G17\n" if entry.get("whole") else BEFORE[dialect]
-    text = f"{head}{lines}\nM30\n"
+    text = f"{head}{lines}\n{'99 END PGM P MM' if dialect == 'heidenhain' else 'M30'}\n"
     try:
         toolpath = read_stream(
             io.BytesIO(text.encode()), "part.nc", over_demonstration(cell), dialect=dialect
@@ -120,9 +121,9 @@ def test_who_follows_a_remedy_gets_the_program_it_promises(code):
 @pytest.mark.parametrize("name", REMEDIES["reason"])
 def test_who_follows_the_remedy_of_a_reason_gets_the_program_it_promises(name):
     entry = REMEDIES["reason"][name]
-    refused, _ = outcome(entry, entry["refused"], None)
+    refused, _ = outcome(entry, entry["refused"], entry.get("of"))
     assert any(entry["says"] in issue.message + issue.remedy for issue in refused)
-    found, tip = outcome(entry, entry["mended"], entry.get("cell"))
+    found, tip = outcome(entry, entry["mended"], entry.get("cell") or entry.get("of"))
     assert not {issue.code for issue in found} & {"dialect-code", "dialect-statement"}
     assert tip == pytest.approx(entry["tip"], abs=1e-9)
 

@@ -34,8 +34,28 @@ class Pilot(Section):
 _EXTERNAL = r"^[A-Za-z][A-Za-z0-9_]{0,23} ?\([A-Za-z0-9_ :,\[\]]*\)$"
 
 
+class Start(Section):
+    """Modes in which the control starts a program, for programs that do not name them."""
+
+    motion: Literal["G0", "G1"] | None = None
+    plane: Literal["G17", "G18", "G19"] | None = None
+    unit: Literal["G20", "G21"] | None = None
+    distance: Literal["G90", "G91"] | None = None
+    feed: Literal["G94", "G95"] | None = None
+    retract: Literal["G98", "G99"] | None = None
+
+
+class Cutter(Section):
+    """What a Fanuc's parameters say of cutter compensation (G41, G42); without both it is refused."""
+
+    lead_in: Literal["a", "b"] | None = None
+    """Type A leads at right angles to the first move of the contour, type B around the corner (5003)."""
+    d: Literal["radius", "diameter", "wear"] | None = None
+    """What the offset D holds: the tool's radius, its diameter, or its wear alone."""
+
+
 class Program(Section):
-    """How the KRL text is laid out."""
+    """How the program is read, and how the KRL text is laid out."""
 
     max_lines: Annotated[int, Field(strict=True, ge=100)] = 5000
     comment_every: Annotated[int, Field(strict=True, ge=0, le=10**9)] = 50
@@ -43,6 +63,8 @@ class Program(Section):
     tool_length: Literal["g43", "from_table"] = "g43"
     """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
     the spindle, for posts that set lengths by touching off and never write G43."""
+    start: Start = Start()
+    cutter: Cutter = Cutter()
     warn_size_mb: Positive = 4.0
     externals: tuple[Annotated[str, Field(pattern=_EXTERNAL)], ...] = ()
     """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""

@@ -1,0 +1,90 @@
+"""Programs for industrial controls, read twice: by the package, and by ``tests/reference/controls.py``.
+
+``python benchmarks/controls_twice.py FOLDER [FOLDER …]`` takes every file below the folders that has the
+marks of a
+Fanuc, a Sinumerik or a Heidenhain, reads it in that dialect for a cell that knows the tools T1 to T99,
+follows one
+remedy where it is refused, and compares the places with the other reading within 1e-6 mm. Printed is for each
+file: read, after one remedy, or not and why; and for those that are read: same, another place, or why they
+are
+not compared. The exit code is 1 where a place differs.
+"""
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl.gcode.origin import control_of
+from tests.cells import over_demonstration
+from tests.reference import controls
+
+_TOOLS = {n: {"diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0} for n in range(1, 100)}
+_CUTTER = {"program": {"cutter": {"lead_in": "a", "d": "radius"}}}
+_FIRST, _REMEDIED = over_demonstration({"tool": _TOOLS}), over_demonstration({"tool": _TOOLS, **_CUTTER})
+_OTHER_DIALECT = {"fanuc": "fanuc-calculator"}
+
+
+def reading(path, dialect):
+    """Return how a program was read, the reading, and why not."""
+    attempts = (("read", _FIRST, dialect), ("one remedy", _REMEDIED, _OTHER_DIALECT.get(dialect, dialect)))
+    why = ""
+    for how, cell, spoken in attempts:
+        try:
+            return how, read_gcode(path, cell, dialect=spoken), ""
+        except Gcode2KrlError as error:
+            first = next(issue for issue in error.issues if issue.severity == "error")
+            why = f"line {first.line}: {first.message} [{first.code}]"
+    return "not", None, why
+
+
+def places(toolpath):
+    """Return the programmed places of a reading: of an arc the end alone, of what is not known None."""
+    arc, at = toolpath.arc, toolpath.position_mm
+    rows = [
+        k
+        for k in range(1, len(arc))
+        if not toolpath.machine[k]
+        and (arc[k] < 0 or k + 1 == len(arc) or arc[k + 1] != arc[k])
+        and (arc[k] >= 0 or (at[k] != at[k - 1]).any() or toolpath.known[k].all())
+    ]
+    return [
+        tuple(float(p) if is_known else None for p, is_known in zip(at[k], toolpath.known[k], strict=True))
+        for k in rows
+    ]
+
+
+def compared(path, dialect, toolpath):
+    """Return what comparing a reading with the other one says."""
+    try:
+        theirs = controls.READERS[dialect](path.read_text(encoding="utf-8", errors="replace"))
+    except controls.Unknown as unknown:
+        return f"not compared ({str(unknown)[:40]})"
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        return f"not compared ({type(error).__name__})"
+    found = controls.difference(controls.columns(places(toolpath)), controls.columns(theirs))
+    return "same" if found is None else f"DIFFERS at {found}"
+
+
+def main():
+    """Read, compare and print."""
+    counts = Counter()
+    for folder in sys.argv[1:]:
+        for path in sorted(p for p in Path(folder).rglob("*") if p.is_file()):
+            mark = control_of(path.read_bytes()[:20000])
+            dialect = mark.control.dialects[0] if mark is not None else ""
+            if dialect not in controls.READERS:
+                continue
+            how, toolpath, why = reading(path, dialect)
+            said = compared(path, dialect, toolpath) if toolpath is not None else why
+            counts[dialect, how] += 1
+            counts[dialect, said.split(" ")[0] if toolpath is not None else "refused"] += 1
+            print(f"{dialect:10} {how:10} {path.name}: {said}")
+    for key, count in sorted(counts.items()):
+        print(*key, count)
+    return int(any(what == "DIFFERS" for _, what in counts))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

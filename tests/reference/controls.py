@@ -1,0 +1,445 @@
+"""Positions of programs for a Fanuc, a Sinumerik and a Heidenhain, read once more: from the manuals, in
+plain Python.
+
+Nothing of the package is used. Only places are worked out: of moves, arcs' ends, drilled holes, subprograms,
+jumps and loops, in G17, without compensation of the cutter and without rotary axes. `columns` makes of
+places what
+two readings can be compared by: at each X and Y the lowest, highest and last Z, as the strokes of a hole
+differ by
+parameters. What this does not know raises `Unknown`, and the program is not compared.
+"""
+
+import math
+import re
+
+MOST_PLACES, SAME_MM = 2_000_000, 1e-7
+_WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+
+
+class Unknown(Exception):  # noqa: N818
+    """Something that is not read here."""
+
+
+def columns(places):
+    """Return (X, Y, lowest Z, highest Z, last Z) for each row of places above each other; None is unknown."""
+    found = []
+    for x, y, z in places:
+        if x is None and y is None and z is None:
+            continue
+        if not found or not all(_is_same(a, b) for a, b in zip(found[-1], (x, y), strict=False)):
+            found.append([x, y, z, z, z])
+            continue
+        last = found[-1]
+        unknown = z is None or last[2] is None
+        last[2:] = [None, None, z] if unknown else [min(last[2], z), max(last[3], z), z]
+    return found
+
+
+def _is_same(a, b):
+    return a == b or (a is not None and b is not None and abs(a - b) < SAME_MM)
+
+
+def difference(ours, theirs, within_mm=1e-6):
+    """Return the first column in which two readings differ, None where none does."""
+
+    def far(a, b):
+        return a is not None and b is not None and abs(a - b) > within_mm
+
+    for k, (a, b) in enumerate(zip(ours, theirs, strict=False)):
+        if any(far(p, q) for p, q in zip(a, b, strict=True)):
+            return k, a, b
+    return None if len(ours) == len(theirs) else (min(len(ours), len(theirs)), len(ours), len(theirs))
+
+
+class _Machine:
+    def __init__(self):
+        self.at = {"X": None, "Y": None, "Z": None}
+        self.places, self.absolute, self.unit = [], True, 1.0
+        self.shift = {"X": 0.0, "Y": 0.0, "Z": 0.0}
+
+    def go(self, **to):
+        self.at.update(to)
+        self.places.append(tuple(self.at[axis] for axis in "XYZ"))
+        if len(self.places) > MOST_PLACES:
+            raise Unknown("too many places")
+
+    def target(self, axis, value, incremental):
+        value *= self.unit
+        if not incremental:
+            return value + self.shift[axis]
+        if self.at[axis] is None:
+            raise Unknown("counted from nowhere")
+        return self.at[axis] + value
+
+    def hole(self, approach, bottom, leave):
+        for z in (approach, bottom, leave):
+            self.go(Z=z)
+
+
+def fanuc(text):
+    """Return the places of a program for a Fanuc or Haas (a number without a point is in units)."""
+    lines = [re.sub(r"\([^)]*\)", "", line).split(";")[0].upper().strip() for line in text.splitlines()]
+    starts = {int(m[1]): k for k, line in enumerate(lines) if (m := re.fullmatch(r"[O:]\s*(\d+)", line))}
+    numbers = {}
+    for k, line in enumerate(lines):
+        if m := re.match(r"/?\s*N\s*(\d+)", line):
+            numbers.setdefault(int(m[1]), []).append(k)
+    run = _Machine()
+    state = {"g": 0, "level": None, "r": None, "z": None, "g98": True, "cycle": 0}
+    _fanuc_lines(lines, 0, starts, numbers, run, state, 0)
+    return run.places
+
+
+def _fanuc_lines(lines, k, starts, numbers, run, state, depth):
+    begun = k
+    while k < len(lines):
+        line = lines[k].lstrip("/").strip()
+        k += 1
+        if re.fullmatch(r"[O:]\s*\d+", line) and k - 1 > begun and depth:
+            raise Unknown("subprogram without an end")
+        if not line or line == "%" or re.match(r"[O:]\s*\d+$", line):
+            continue
+        if re.search(r"[#\[\],]|IF|GOTO|WHILE", line):
+            raise Unknown("macro")
+        words = [(a, float(v)) for a, v in _WORD.findall(line)]
+        if re.sub(r"\s", "", _WORD.sub("", line)):
+            raise Unknown(line)
+        w = dict(words)
+        gs, ms = {v for a, v in words if a == "G"}, {v for a, v in words if a == "M"}
+        if (
+            gs & {41, 42, 16, 68, 51, 52, 92, 10, 65, 66, 18, 19, 54.1, 43.4, 76, 87, 88}
+            or "A" in w
+            or "B" in w
+        ):
+            raise Unknown("G-code")
+        run.unit = 25.4 if 20 in gs else 1.0 if 21 in gs else run.unit
+        run.absolute = True if 90 in gs else False if 91 in gs else run.absolute
+        state["g98"] = True if 98 in gs else False if 99 in gs else state["g98"]
+        axes = {a: v for a, v in w.items() if a in "XYZ"}
+        if gs & {28, 30, 53}:
+            for axis in axes:
+                run.at[axis] = None
+            if {"X", "Y"} <= set(axes):
+                run.at["Z"] = None
+        elif 4 not in gs:
+            _fanuc_move(gs, w, axes, run, state)
+        if ms & {98, 97}:
+            number = int(w["P"])
+            times = int(w.get("L", 1)) if number < 10000 or 97 in ms else number // 10000
+            number = number % 10000 if 98 in ms and number >= 10000 else number
+            place = numbers.get(number, [None])[0] if 97 in ms else starts.get(number)
+            if place is None or depth > 8:
+                raise Unknown("subprogram")
+            for _ in range(times):
+                if _fanuc_lines(lines, place + (98 in ms), starts, numbers, run, state, depth + 1):
+                    return True
+        if 99 in ms:
+            return False
+        if ms & {2, 30}:
+            return True
+    return True
+
+
+def _fanuc_move(gs, w, axes, run, state):
+    cycles = {73, 74, 81, 82, 83, 84, 85, 86, 89}
+    named = gs & ({0, 1, 2, 3} | cycles)
+    if 80 in gs:
+        state["cycle"] = 0
+    if named:
+        code = int(named.pop())
+        if code in cycles and not state["cycle"]:
+            state["level"] = run.at["Z"]
+        state["cycle"] = code if code in cycles else 0
+        state["g"] = code if code < 4 else state["g"]
+    if state["cycle"]:
+        if "R" in w:
+            state["r"] = w["R"] * run.unit if run.absolute else state["level"] + w["R"] * run.unit
+        if "Z" in w:
+            state["z"] = w["Z"] * run.unit if run.absolute else state["r"] + w["Z"] * run.unit
+        if not axes:
+            return
+        times = int(w.get("K", w.get("L", 1)))
+        for _ in range(times):
+            if run.at["Z"] is not None and run.at["Z"] < state["r"]:
+                run.go(Z=state["r"])
+            run.go(**{a: run.target(a, v, not run.absolute) for a, v in axes.items() if a != "Z"})
+            top = (
+                max(state["level"], state["r"]) if state["g98"] and state["level"] is not None else state["r"]
+            )
+            if state["g98"] and state["level"] is None:
+                raise Unknown("level")
+            run.hole(state["r"], state["z"], top)
+    elif axes or (state["g"] > 1 and {"I", "J"} & set(w)):
+        run.go(**{a: run.target(a, v, not run.absolute) for a, v in axes.items()})
+
+
+_SIEMENS = {
+    "SIN": lambda a: math.sin(math.radians(a)),
+    "COS": lambda a: math.cos(math.radians(a)),
+    "TAN": lambda a: math.tan(math.radians(a)),
+    "SQRT": math.sqrt,
+    "ABS": abs,
+    "TRUNC": math.trunc,
+    "POT": lambda a: a * a,
+    "ROUND": lambda a: math.floor(a + 0.5),
+}
+
+
+def _value(text, variables):
+    """Return the value of an expression of a Sinumerik or Heidenhain."""
+    python = re.sub(r"<>", "!=", text.strip().upper())
+    python = (
+        re.sub(r"\b(AND|OR|NOT)\b", lambda m: m[1].lower(), python).replace("DIV", "//").replace("MOD", "%")
+    )
+    python = re.sub(r"(?<![\w.])0+(\d)", r"\1", python)
+    try:
+        return float(eval(python, {"__builtins__": {}}, {**_SIEMENS, **variables}))
+    except Exception as error:
+        raise Unknown(text) from error
+
+
+_BRACKET = r"\((?:[^()]|\([^()]*\))*\)"
+_ADDRESS = re.compile(
+    rf"([A-Z]+\d*)\s*=\s*((?:AC|IC)?{_BRACKET}|(?:[^\s();]|\([^()]*\))+)"
+    r"|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))"
+)
+_SAID = (
+    r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|NORM|CYCLE832\s*\([^)]*\)"
+    r"|G64[0-9]*|ADIS\s*=\S+)"
+)
+
+
+def siemens(text):
+    """Return the places of a program for a Sinumerik 840D."""
+    lines = [line.split(";")[0].upper().strip() for line in text.splitlines()]
+    lines = [re.sub(r"^/?\s*N\d+\s*", "", line) for line in lines]
+    labels, codes = {}, []
+    for k, line in enumerate(lines):
+        found = re.match(r"([A-Z_]{2}\w*)\s*:(?!=)\s*", line)
+        if found:
+            labels[found[1]] = k
+        codes.append(line[found.end() :] if found else line)
+    pairs = _blocks(codes)
+    run, variables, state = _Machine(), {f"R{n}": 0.0 for n in range(100)}, {"g": 0, "modal": None}
+    k, stack, steps = 0, [], 0
+    while k < len(codes):
+        steps += 1
+        if steps > MOST_PLACES:
+            raise Unknown("endless")
+        while stack and stack[-1][1] == k and stack[-1][2] == 0:
+            k = stack.pop()[3]
+        if stack and stack[-1][1] == k:
+            stack[-1][2] -= 1
+            k = stack[-1][0]
+        line = codes[k]
+        here, k = k, k + 1
+        if (m := re.match(r"(?:IF\s+(.*?)\s*)?GOTO([FB]?)\s+(\w+)$", line)) is not None:
+            if m[1] is None or _value(m[1], variables):
+                k = labels[m[3]]
+        elif (m := re.match(r"(IF|WHILE|UNTIL)\b(.*)$", line)) is not None:
+            if not _value(m[2], variables):
+                k = pairs[here] if m[1] == "UNTIL" else pairs[here] + 1
+        elif re.match(r"(ELSE|ENDWHILE|ENDLOOP)\b", line):
+            k = pairs[here] + (line == "ELSE")
+        elif (m := re.match(r"FOR\s+(\w+)\s*=(.*)\bTO\b(.*)$", line)) is not None:
+            variables[m[1]] = _value(m[2], variables)
+            if variables[m[1]] > _value(m[3], variables):
+                k = pairs[here] + 1
+        elif line == "ENDFOR":
+            m = re.match(r"FOR\s+(\w+)\s*=(.*)\bTO\b(.*)$", codes[pairs[here]])
+            variables[m[1]] += 1
+            if variables[m[1]] <= _value(m[3], variables):
+                k = pairs[here] + 1
+        elif (m := re.match(r"REPEAT\s+(\w+)(?:\s+(?!P\s*=)(\w+))?(?:\s+P\s*=\s*(.*))?$", line)) is not None:
+            end = labels[m[2]] + 1 if m[2] else here
+            times = int(_value(m[3], variables)) if m[3] else 1
+            if times:
+                stack.append([labels[m[1]], end, times - 1, k])
+                k = labels[m[1]]
+        elif re.match(r"(ENDIF|LOOP|REPEAT)$", line):
+            continue
+        elif _siemens_block(line, run, variables, state):
+            break
+    return run.places
+
+
+def _blocks(codes):
+    """Return where each IF, ELSE, loop and end leads."""
+    pairs, stack = {}, []
+    for k, line in enumerate(codes):
+        word = re.match(r"[A-Z]*", line)[0]
+        if (word == "IF" and "GOTO" not in line) or word in ("WHILE", "FOR", "LOOP") or line == "REPEAT":
+            stack.append(k)
+        elif word == "ELSE":
+            pairs[stack.pop()] = k
+            stack.append(k)
+        elif word in ("ENDIF", "ENDWHILE", "ENDFOR", "ENDLOOP", "UNTIL"):
+            begin = stack.pop()
+            pairs[k], pairs[begin] = begin, k
+    return pairs
+
+
+def _siemens_block(line, run, variables, state):
+    """Carry out one block; return whether the program ends."""
+    if (m := re.match(r"DEF\s+(?:REAL|INT)\s+(.*)$", line)) is not None:
+        for part in m[1].split(","):
+            name, _, value = part.partition("=")
+            variables[name.strip()] = _value(value, variables) if value else 0.0
+        return False
+    line = re.sub(_SAID, " ", line)
+    if line.startswith("%") or line.startswith("WORKPIECE"):
+        return False
+    modal = "MCALL" in line
+    cycle = re.search(r"CYCLE(8[123])\s*\((.*)\)", line)
+    if cycle or modal:
+        hole = _siemens_hole(cycle, variables) if cycle else None
+        if modal:
+            state["modal"] = hole
+        else:
+            run.hole(*hole)
+        return False
+    frame = re.match(r"(A?)TRANS\b", line)
+    machine = re.search(r"\bSUPA\b|\bG53\b", line)
+    rest = re.sub(r"\bSUPA\b|\bA?TRANS\b|T\s*=\s*\"[^\"]*\"", " ", line)
+    words = [(m[1] or m[3], m[2] or m[4]) for m in _ADDRESS.finditer(rest)]
+    if re.sub(r"\s", "", _ADDRESS.sub("", rest)):
+        raise Unknown(line)
+    gs = {float(v) for a, v in words if a == "G"}
+    ms = {float(v) for a, v in words if a == "M"}
+    if gs & {41, 42, 18, 19, 110, 111, 112, 58, 59, 33, 331, 70}:
+        raise Unknown("G-code")
+    run.unit = 25.4 if 700 in gs else 1.0 if gs & {71, 710} else run.unit
+    run.absolute = True if 90 in gs else False if 91 in gs else run.absolute
+    moves = {int(g) for g in gs} & {0, 1, 2, 3}
+    state["g"] = moves.pop() if moves else state["g"]
+    to = {}
+    for address, value in words:
+        if address in ("X", "Y", "Z"):
+            way = value[:2] if value[:2] in ("AC", "IC") else ""
+            to[address] = (
+                _value(value[len(way) :], variables),
+                way == "IC" or (not way and not run.absolute),
+            )
+        elif address in variables:
+            variables[address] = _value(value, variables)
+        elif address not in ("G", "M", "F", "S", "T", "D", "N", "I", "J", "K", "CR", "TURN", "P", "S1", "H"):
+            raise Unknown(address)
+    if frame:
+        for axis in run.shift:
+            value = to.get(axis, (0.0, False))[0] * run.unit
+            run.shift[axis] = run.shift[axis] + value if frame[1] else value
+    elif machine:
+        for axis in to:
+            run.at[axis] = None
+    elif 4 not in gs and (to or (state["g"] > 1 and any(a in ("I", "J") for a, _ in words))):
+        run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        if state["modal"]:
+            run.hole(*state["modal"])
+    return bool(ms & {2, 17, 30})
+
+
+def _siemens_hole(cycle, variables):
+    given = [_value(part, variables) if part.strip() else None for part in cycle[2].split(",")]
+    given += [None] * 8
+    rtp, rfp, sdis, dp, dpr = given[:5]
+    if dp is not None and dpr is not None:
+        raise Unknown("two depths")
+    return rfp + (sdis or 0.0), dp if dp is not None else rfp - dpr, rtp
+
+
+def heidenhain(text):
+    """Return the places of a conversational program."""
+    logical = []
+    for line in text.splitlines():
+        goes_on = line.rstrip().endswith("~")
+        code = " ".join(re.sub(r"^\s*\d+\s+", "", line.rstrip(" ~\r")).split(";")[0].upper().split())
+        if logical and logical[-1][1]:
+            logical[-1] = (f"{logical[-1][0]} {code}", goes_on)
+        else:
+            logical.append((code, goes_on))
+    codes = [re.sub(r"\bCYCLE DEF\b", "CYCL DEF", code.replace(",", ".")) for code, _ in logical]
+    labels = {m[1]: k for k, code in enumerate(codes) if (m := re.match(r"LBL (\S+)$", code)) and m[1] != "0"}
+    run, q = _Machine(), {}
+    state = {"pole": {}, "hole": None}
+    _heidenhain_lines(codes, 0, labels, run, q, state, 0)
+    return run.places
+
+
+def _heidenhain_lines(codes, k, labels, run, q, state, depth):
+    repeats = {}
+    while k < len(codes):
+        code = codes[k]
+        here, k = k, k + 1
+        if code == "LBL 0" and depth:
+            return False
+        if (m := re.match(r"CALL LBL (\S+?)(?: REP ?(\d+)\S*)?$", code)) is not None:
+            if m[2] is None:
+                if depth > 8 or _heidenhain_lines(codes, labels[m[1]] + 1, labels, run, q, state, depth + 1):
+                    return True
+            elif repeats.setdefault(here, int(m[2])) > 0:
+                repeats[here] -= 1
+                k = labels[m[1]]
+            else:
+                del repeats[here]
+        elif (m := re.match(r"FN ?(9|1[012]) ?: ?IF (\S+) (\S+) (\S+) GOTO LBL (\S+)$", code)) is not None:
+            a, b = _value(m[2], q), _value(m[4], q)
+            if {"EQU": a == b, "NE": a != b, "GT": a > b, "LT": a < b}[m[3]]:
+                k = labels[m[5]]
+        elif (m := re.match(r"(?:FN ?\d ?: ?)?(Q\d+) ?= ?(.*)$", code)) is not None:
+            q[m[1]] = _value(m[2].replace(" DIV ", " / "), q)
+        elif _heidenhain_block(code, run, q, state):
+            return True
+    return True
+
+
+def _heidenhain_block(code, run, q, state):
+    head = code.split(" ")[0] if code else ""
+    if head in ("", "BLK", "TOOL", "BEGIN", "LBL", "STOP", "*") or code.startswith("*"):
+        return False
+    if head == "END":
+        return True
+    if head == "CYCL":
+        return _heidenhain_cycle(code, run, q, state)
+    if head == "CC":
+        for axis, value in re.findall(r"([XY]) ?([+-]?[\dQ.]+)", code):
+            state["pole"][axis] = _value(value, q)
+        return False
+    if head in ("L", "C", "CR", "CT") or re.match(r"M\d", head):
+        if re.search(r"\bR[LR]\b|\b[ABC][+-]?\d|\bPLANE|\bM128", code):
+            raise Unknown("compensation or rotary axes")
+        to = {}
+        for incremental, axis, value in re.findall(r"(?:^| )(I?)([XYZ]) ?([+-]?[\dQ.]+)", code):
+            to[axis] = (_value(value, q), bool(incremental))
+        machine = re.search(r"\bM91\b", code) or "M140" in code
+        if machine:
+            for axis in to or {"Z": 0}:
+                run.at[axis] = None
+        elif to:
+            run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        if re.search(r"\bM99\b", code):
+            run.hole(*state["hole"])
+        return re.search(r"\bM(?:0?2|30)\b", code) is not None
+    if head == "CP" and (m := re.search(r"IPA ?([+-]?[\d.]+)", code)) and float(m[1]) % 360 == 0:
+        z = re.search(r"IZ ?([+-]?[\d.]+)", code)
+        run.go(Z=run.at["Z"] + (float(z[1]) if z else 0.0))
+        return False
+    raise Unknown(code)
+
+
+def _heidenhain_cycle(code, run, q, state):
+    if code.startswith("CYCL CALL"):
+        if "POS" in code or "PAT" in code:
+            raise Unknown(code)
+        run.hole(*state["hole"])
+    elif re.match(r"CYCL DEF (?:200|201|203|207)\b", code):
+        given = {name: _value(value, q) for name, value in re.findall(r"Q(2\d\d) ?= ?([+-]?[\dQ.]+)", code)}
+        top = given["203"] + max(given["200"], given.get("204", 0.0))
+        state["hole"] = (given["203"] + given["200"], given["203"] + given["201"], top)
+    elif (m := re.match(r"CYCL DEF 7\.\d ([XYZ]) ?([+-]?[\d.]+)$", code)) is not None:
+        run.shift[m[1]] = float(m[2])
+    elif not re.match(r"CYCL DEF (?:7\.0|9\.|32|247)", code):
+        raise Unknown(code)
+    return False
+
+
+READERS = {"fanuc": fanuc, "sinumerik": siemens, "heidenhain": heidenhain}
