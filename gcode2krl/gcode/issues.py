@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import findings as f
-from gcode2krl.gcode import sentences
+from gcode2krl.gcode import findings, sentences
 from gcode2krl.gcode.excerpt import column, quote
 from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.slips import slip
@@ -89,7 +88,7 @@ def found_issues(
     """
     rows = found[: counts["findings"]]
     issues = [_issue(row, texts) for row in rows]
-    misfits = [k for k, row in enumerate(rows) if row["number"] == f.ARC_RADIUS_MISMATCH]
+    misfits = [k for k, row in enumerate(rows) if row["number"] == findings.F.ARC_RADIUS_MISMATCH]
     if misfits:
         issues[misfits[0]] = _of_all_misfits(
             issues[misfits[0]], rows[misfits[0]], [int(rows[k]["line"]) for k in misfits], state
@@ -115,7 +114,7 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     if excerpt:
         issue = replace(issue, column=column(texts[line], number, a, b, c))
     letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
-    may_slip = line in texts and not (number == f.O_WORD and _O_LINE.match(texts[line]))
+    may_slip = line in texts and not (number == findings.F.O_WORD and _O_LINE.match(texts[line]))
     usual = slip(texts[line], issue.code, letter) if may_slip else None
     return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
 
@@ -202,7 +201,7 @@ def _spirals(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
     remedy = sentences.SPIRAL_REMEDY.format(
         decimals=sentences.decimals_needed(float(state["spiral_unit_mm"]))
     )
-    excerpt = quote(texts[line], f.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
+    excerpt = quote(texts[line], findings.F.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
     yield Issue("warning", "arc-radius-differs", line, sentence, remedy, excerpt)
 
 

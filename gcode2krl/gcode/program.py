@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.gcode import arguments, macro_words
+from gcode2krl.gcode import arguments, findings, macro_words
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import findings as f
-from gcode2krl.gcode import program_faults as faults
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
@@ -153,13 +151,13 @@ class Program:
 
     def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
         flow = Flow(self._lines, word_of_row, _Rows(self._labels))
-        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != f.OK)
+        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != findings.F.OK)
         for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
             start = int(self._lines["start"][row])
             content = self._text[start : self._text.index(b"\n", start)]
             if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
-            elif self._lines["fault"][row] != f.OK:
+            elif self._lines["fault"][row] != findings.F.OK:
                 flow.add_refused(row, is_o_line=bool(parsed(content).label))
             else:
                 flow.add(row, parsed(content))
@@ -253,10 +251,10 @@ class Program:
             self._read_file(label)
         found = self._macro(label, file) if self._is_macro else self._definition(label, file, word)
         if found is None:
-            self._report(hands_over, word, f.SUBPROGRAM_MISSING)
+            self._report(hands_over, word, findings.F.SUBPROGRAM_MISSING)
             return
         if self._is_macro and len(self._in_file(label, file)) > 1:
-            self._report(hands_over, word, f.O_WORD, faults.FAULT_SUB_TWICE)
+            self._report(hands_over, word, findings.F.O_WORD, findings.PF.FAULT_SUB_TWICE)
             return
         self._tell_subprograms()
         ready = self._subprograms[self._labels[label]]

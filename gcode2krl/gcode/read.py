@@ -14,12 +14,11 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode import findings, machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
-from gcode2krl.gcode.findings import DIALECT_STATEMENT
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
@@ -412,7 +411,7 @@ class _Interpreter:
         known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if self.state["corner"][0]:  # the program has ended before the block that makes it
             line = int(self.state["corner_line"][0])
-            known.append(make_issue(DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
+            known.append(make_issue(findings.F.DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
         found = [self._placed(issue) for issue in known]
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints
-from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
 
 _HEAD = rb"[ \t\r]*(?:/\d?)?[ \t\r]*(?:N[ \t]*(?P<block>\d+)[ \t]*)?"
@@ -53,7 +53,7 @@ class SiemensFlow:
             return
         target = self._target(found["target"].upper(), found["way"].upper(), word)
         if target is None:
-            lines["kind"][row], lines["fault"][row] = tables.KIND_FAULT, faults.FAULT_NO_LABEL
+            lines["kind"][row], lines["fault"][row] = tables.KIND_FAULT, findings.PF.FAULT_NO_LABEL
             return
         lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
         lines["target"][row] = target
