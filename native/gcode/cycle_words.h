@@ -18,7 +18,6 @@ typedef struct {
 } Cycle;
 
 Cycle cycle_of(const Block *block);
-bool drill_here(Block *block, const Cycle *cycle);
 bool cycle_words(Block *block, Cycle *cycle);
 void learn_across(Block *block, const Cycle *cycle);
 void remember_cycle(Block *block, const Cycle *cycle);
