@@ -4,11 +4,11 @@
     python benchmarks/planted_faults.py --count 20 --area gcode2krl/krl  # of one area
     python benchmarks/planted_faults.py --count 20 --area native/gcode --tests tests/gcode
 
-A fault is one small change: an operator, a constant, a sign, an index, a branch that is never taken. It is
-drawn with a seed and planted in a copy of the tree. Then the tests run that import the module, the nearest
-first, and the golden programs, or those that ``--tests`` names; the first that fails, or hangs, has noticed it.
-The suite must pass without a fault. Some faults change nothing that can be seen, so that no suite notices all:
-what counts is the same seed before and after a change of the tests.
+A fault is one small change: an operator, a constant, a sign, an index, a branch never taken. It is drawn
+with a seed and planted in a copy of the tree. Then the tests run that import the module, the nearest
+first, and the golden programs, or those that ``--tests`` names; the first that fails, or hangs, has
+noticed it. The suite must pass without a fault. Some faults change nothing that can be seen, so that no
+suite notices all: what counts is the same seed before and after a change of the tests.
 """
 
 import argparse
