@@ -44,7 +44,7 @@ MODULES = {
     "ADVANCE": "gcode2krl.collision.along",
     "FEED": "gcode2krl.online.feed",
     "LIMITS": "gcode2krl.online.limits",
-    "BLENDING": "gcode2krl.online.blending",
+    "BLENDING": "gcode2krl.online.compensator",
     "PILOT": "gcode2krl.online.pilot_gate",
     "DIFF": "gcode2krl.krl.differences",
 }

@@ -16,7 +16,6 @@ from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings, machine, tool_table
 from gcode2krl.gcode import vocabulary as v
-from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
@@ -53,6 +52,33 @@ from gcode2krl.gcode.tool_comments import (
 )
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
+
+# How far chords may be from their arc: which tolerances are plausible, doubtful or refused.
+
+WIDE_MM = 1.0
+"""Assumed: facets this deep are visible on any part."""
+MOST_MM = 10.0
+"""Assumed: arcs of most parts would be one chord."""
+
+
+def chord_tolerance_issues(chord_tolerance_mm: float, source: str) -> Iterator[Issue]:
+    """Yield what is doubtful about a chord tolerance; raise an input error where it is too large."""
+    if chord_tolerance_mm > MOST_MM:
+        raise input_error(
+            "option-value",
+            f"chord tolerance {chord_tolerance_mm:g} mm is more than {MOST_MM:g} mm: arcs would be lost",
+            "0.01 is usual (--chord-tolerance)",
+            source=source,
+        )
+    if chord_tolerance_mm > WIDE_MM:
+        yield Issue(
+            "warning",
+            "chord-tolerance",
+            0,
+            f"chords may be {chord_tolerance_mm:g} mm off their arc",
+            "0.01 is usual (--chord-tolerance)",
+        )
+
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell

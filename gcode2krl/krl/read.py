@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,12 +13,60 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.core import (
+    BYTES,
+    FLOATS,
+    INTS32,
+    OUT_BOOLS,
+    OUT_FLOATS,
+    OUT_INTS,
+    OUT_INTS32,
+    core_function,
+)
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
-from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.controller_state import may_disturb
 from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
+
+# Statements in the order of execution to columns of motions: speed and approximation in force, line.
+
+_pass = core_function("krl_pass", BYTES, FLOATS, OUT_FLOATS, OUT_INTS)
+_motions = core_function(
+    "krl_motions", BYTES, BYTES, INTS32, FLOATS, FLOATS, OUT_BOOLS, OUT_FLOATS, OUT_FLOATS, OUT_INTS32
+)
+
+
+def motion_columns(
+    kind: NDArray[np.int8], blend: NDArray[np.int8], line: Ints32, number: Floats
+) -> tuple[Bools, Floats, Floats, Ints32]:
+    """Return PTP, speed in mm/s, approximation in mm and line (p,) of the motions among statements (k,).
+
+    ``number`` (k - p,) is the first number of each statement that is no motion. Speed and approximation are
+    those of the last setting that has one, NaN before the first and behind `KIND_FORGETS`; the speed of a PTP
+    is NaN, the approximation of a motion without ``C_DIS`` is 0.
+    """
+    kinds, blends = kind.view(np.uint8), blend.view(np.uint8)
+    borders = chunk_borders(len(kind))
+    in_force, counts = np.full(2, np.nan), np.zeros(2, dtype=np.int64)
+    before = {0: (in_force.copy(), (0, 0))}
+    for start, end in pairwise(borders):
+        _pass(kinds[start:end], number, in_force, counts)
+        before[end] = in_force.copy(), (int(counts[0]), int(counts[1]))
+    count = before[borders[-1]][1][0]
+    ptp, motion_line = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.int32)
+    speed_mm_s, cdis_mm = np.empty((2, count))
+
+    def part(start: int, end: int) -> None:
+        (settings, (motion, other)), (_, (last_motion, last_other)) = before[start], before[end]
+        rows, own = slice(start, end), slice(motion, last_motion)
+        columns = ptp[own], speed_mm_s[own], cdis_mm[own], motion_line[own]
+        _motions(kinds[rows], blends[rows], line[rows], number[other:last_other], settings, *columns)
+
+    in_chunks(part, borders)
+    return ptp, speed_mm_s, cdis_mm, motion_line
+
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)

@@ -1,7 +1,7 @@
 """Verify: the program read back against what it should say, and against the controller's rules."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.chain import Plan, forecast_of, prepare
+from gcode2krl.chain import Plan, forecast_of, foresee, prepare
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.exchange.findings import Findings, counted, findings_block
@@ -21,12 +21,13 @@ from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.cell_hashes import StatedCell
 from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
-from gcode2krl.krl.hazards import judged
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
+from gcode2krl.krl.release import is_refusing, released_again
+from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues, state_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
@@ -38,6 +39,39 @@ from gcode2krl.program.arcs import arcs_of
 from gcode2krl.program.splines import splines_of
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
+
+# The findings that would refuse a program, or be told with it, judged anew with the cell as it is now.
+
+
+def judged(
+    plan: Plan,
+    prediction: Prediction | None,
+    releases: Mapping[str, int | None],
+    *,
+    online: bool,
+    forces: bool,
+) -> list[Issue]:
+    """Return errors and warnings of the checks of a translation, each with the G-code as its file.
+
+    Those that a Prediction brings along are not run again.
+    ``releases`` are those in the header of the program and how many findings each was for, None for any.
+    ``forces`` cuts material too.
+    """
+    targets, cell = plan.targets, plan.cell
+    known = [*targets.issues] if prediction is None else [*prediction.issues]
+    if online:
+        known = [*online_issues(targets, cell), *retract_issues(targets, cell), *known]
+    if prediction is None and not is_refusing(known, releases):  # else nothing can be foreseen
+        forecast = foresee(plan, forces=forces)
+        known += forecast.issues[len(targets.issues) :]
+    return list(_of_gcode(released_again(known, releases), plan.toolpath.source))
+
+
+def _of_gcode(issues: Iterable[Issue], source: str) -> Iterator[Issue]:
+    """Yield the findings but the notes, with the file that they are about."""
+    for issue in issues:
+        if issue.severity != "note":
+            yield issue if issue.file else replace(issue, file=source)
 
 
 @dataclass(frozen=True, repr=False)

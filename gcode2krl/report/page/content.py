@@ -1,11 +1,14 @@
 """What the page shows, from the tables of a prediction or from what is known of a refused program."""
 
+import zlib
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
@@ -15,8 +18,6 @@ from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
-from gcode2krl.report.page.coarse import drawn_mesh
-from gcode2krl.report.page.columns import packed, packed_text
 from gcode2krl.report.page.losses import (
     Place,
     Window,
@@ -32,6 +33,89 @@ from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
+
+# Columns of numbers as the page carries them: whole multiples of a step, differences, bytes by their
+# weight.
+#
+# Neighbouring samples differ little, so that the upper bytes of the differences are nearly all alike and
+# deflate takes them to almost nothing. `data.js` reads it back.
+
+MISSING = -(2**31)
+"""Stands for a value that is not known (NaN)."""
+_LARGEST = 2.0**30
+_LEVEL = 6
+"""9 saves 3 % of the size and takes twelve times as long."""
+
+
+def packed(columns: Mapping[str, tuple[npt.ArrayLike, float]]) -> tuple[str, list[dict[str, Any]]]:
+    """Return columns of equal length as text in base 64, and the name and step of each in their order.
+
+    Parameters
+    ----------
+    columns : name → values (m,) and the step to which they are rounded, in the values' unit. A step that is
+        too small for 31 bits is made larger.
+    """
+    described, parts = [], []
+    for name, (given, wanted) in columns.items():
+        values = np.asarray(given, dtype=np.float64)
+        present = np.isfinite(values)
+        largest = float(np.abs(values, where=present, out=np.zeros(len(values))).max(initial=0.0))
+        step = max(wanted, largest / _LARGEST)
+        whole = np.full(len(values), MISSING, dtype=np.int64)
+        whole[present] = np.rint(values[present] / step).astype(np.int64)
+        parts.append(_bytes_by_weight(whole))
+        described.append({"name": name, "step": step})
+    return b64encode(zlib.compress(b"".join(parts), _LEVEL)).decode("ascii"), described
+
+
+def packed_text(text: str) -> str:
+    """Return a text compressed and in base 64."""
+    return b64encode(zlib.compress(text.encode("utf-8", "replace"), _LEVEL)).decode("ascii")
+
+
+def _bytes_by_weight(whole: Ints) -> bytes:
+    """Return the differences modulo 2³² of whole numbers (m,): all lowest bytes, then all second, …"""
+    differences = np.diff(whole, prepend=np.zeros(1, dtype=np.int64)) & 0xFFFFFFFF
+    return differences.astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+# A mesh with few triangles, to be looked at: what lies in one cell of a grid becomes one corner.
+#
+# Not for distances: a corner moves by up to the diagonal of a cell.
+
+MOST_TRIANGLES = 4000
+"""Triangles that a page draws of one mesh, some 30 kB."""
+_FINEST = 256
+"""Cells along the longest side of the finest grid."""
+_COARSER = 0.8
+
+
+def drawn_mesh(triangles_mm: Floats, most: int = MOST_TRIANGLES) -> Floats:
+    """Return triangles (t, 3, 3) of a mesh (n, 3, 3), at most so many; all of them where they are few."""
+    cells = float(_FINEST)
+    drawn = triangles_mm
+    while len(drawn) > most and cells >= 2.0:
+        drawn = _clustered(triangles_mm, cells)
+        cells *= _COARSER
+    return drawn
+
+
+def _clustered(triangles_mm: Floats, cells: float) -> Floats:
+    """Return the triangles whose corners are in three cells of a grid with so many along its longest side."""
+    corners = triangles_mm.reshape(-1, 3)
+    low = corners.min(axis=0)
+    side_mm = max(float(np.ptp(corners, axis=0).max()), 1e-9) / cells
+    place = np.floor((corners - low) / side_mm).astype(np.int64)
+    number = (place[:, 0] * (_FINEST + 1) + place[:, 1]) * (_FINEST + 1) + place[:, 2]
+    _, own, count = np.unique(number, return_inverse=True, return_counts=True)
+    middle = np.stack([np.bincount(own, corners[:, k]) / count for k in range(3)], axis=1)
+    faces = own.reshape(-1, 3)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    drawn: Floats = middle[faces[np.sort(first)]]
+    return drawn
+
 
 NO_COLLISIONS = (
     "Collisions of arm, spindle, holder and cables with anything: look along the path with the slider.",
