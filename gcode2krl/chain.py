@@ -1,8 +1,9 @@
 """The one chain from a Toolpath to what a program and a prediction are made of.
 
-`prepare` makes a `Plan`: what the robot will be told, and all that is known before it moves. A `Run` is the
-motion of a plan, whose samples pass joints, cutting and compliance in blocks. `collect` keeps every sample
-and returns a Prediction; `foresee` keeps what a program and its summary need: a Forecast.
+`prepare` makes a `Plan`: what the robot will be told, and all that is known before it moves. A
+`PlannedMotion` is the motion of a plan, whose samples pass joints, cutting and compliance in blocks.
+`collect` keeps every sample and returns a Prediction; `foresee` keeps what a program and its summary need:
+a Forecast.
 """
 
 import hashlib
@@ -133,7 +134,7 @@ def corner_errors(
     return error_mm, findings
 
 
-class Run:
+class PlannedMotion:
     """The motion of a plan, planned; its samples then pass cutting and compliance in blocks."""
 
     def __init__(self, plan: Plan, dt_s: float, *, keeps: bool) -> None:
@@ -173,7 +174,7 @@ def collect(
     cell, targets = plan.cell, plan.targets
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     begin("motion")
-    run = Run(plan, dt_s, keeps=True)
+    run = PlannedMotion(plan, dt_s, keeps=True)
     begin("joints")
     kept = run.motion.samples()
     motion, joints = kept.motion, kept.joints(cell)
@@ -214,7 +215,7 @@ def _inputs(plan: Plan, dt_s: float, settings: dict[str, Any]) -> dict[str, Any]
 def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Forecast:
     """Return what a program needs of a plan's prediction at the controller's cycle; no sample is kept."""
     begin("motion and joints")
-    run = Run(plan, plan.cell.controller.cycle_s, keeps=False)
+    run = PlannedMotion(plan, plan.cell.controller.cycle_s, keeps=False)
     course, figures = run.motion.course, LargestLoads()
     samples = PilotSamples(plan.cell, course.count)
     if forces:

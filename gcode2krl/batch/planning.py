@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.batch.parts import Part
+from gcode2krl.batch.parts import BatchPart
 from gcode2krl.batch.work import Task
 from gcode2krl.cell import Cell
 from gcode2krl.cell.library import models_folder
@@ -41,7 +41,7 @@ _PLACES = ("report", "job_path", "search")
 class Planned:
     """A part, and what its batch does with it."""
 
-    part: Part
+    part: BatchPart
     task: Task
     inputs: tuple[Path, ...]
     """Files that no output may replace."""
@@ -63,7 +63,7 @@ class _Cell:
     files: tuple[Path, ...]
 
 
-def plan(parts: Iterable[Part], order: Order, pages: bool = False) -> list[Planned]:
+def plan(parts: Iterable[BatchPart], order: Order, pages: bool = False) -> list[Planned]:
     """Return what to do for each part with the options of ``order``, and with ``pages`` a page for each.
 
     Raises `NotUnderstoodError` where a cell or a job is wrong, or where two parts would have one output.
@@ -85,7 +85,7 @@ def plan(parts: Iterable[Part], order: Order, pages: bool = False) -> list[Plann
     ]
 
 
-def _read_cell(part: Part) -> _Cell:
+def _read_cell(part: BatchPart) -> _Cell:
     path = None if part.cell is None else str(part.cell)
     job = None if part.job is None else str(part.job)
     cell, _ = read_cell_under_job(path, job)
@@ -93,7 +93,7 @@ def _read_cell(part: Part) -> _Cell:
     return _Cell(cell, cell_of(cell, path)["sha256"], tuple(files))
 
 
-def _planned(part: Part, cell: _Cell, order: Order, page: str) -> Planned:
+def _planned(part: BatchPart, cell: _Cell, order: Order, page: str) -> Planned:
     own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
     try:
         size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
@@ -121,15 +121,15 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
 # where programs go ------------------------------------------------------------------------------------------
 
 
-def program_name(part: Part, taken: Sequence[str]) -> str:
+def program_name(part: BatchPart, taken: Sequence[str]) -> str:
     """Return the name of a part's program: the file's, or one made from it that a controller takes."""
     stem = program_stem(part.key)
     return suggested_name(stem, taken) if name_problem(stem, taken) else stem
 
 
-def refuse_collisions(parts: Iterable[Part], name_of: Callable[[Part], str]) -> None:
+def refuse_collisions(parts: Iterable[BatchPart], name_of: Callable[[BatchPart], str]) -> None:
     """Raise `NotUnderstoodError` where two parts of one folder have one program name; names both."""
-    seen: dict[str, Part] = {}
+    seen: dict[str, BatchPart] = {}
     for part in parts:
         place = f"{part.folder}{name_of(part)}"
         other = seen.setdefault(place.casefold(), part)  # neither KRL nor Windows tells case apart
@@ -138,9 +138,9 @@ def refuse_collisions(parts: Iterable[Part], name_of: Callable[[Part], str]) -> 
             raise input_error("output-is-input", sentence, "rename one of them")
 
 
-def alike(parts: Iterable[Part], name_of: Callable[[Part], str]) -> Mapping[str, Issue]:
+def alike(parts: Iterable[BatchPart], name_of: Callable[[BatchPart], str]) -> Mapping[str, Issue]:
     """Return part → finding for parts of different folders whose programs have one name."""
-    of_name: dict[str, list[Part]] = {}
+    of_name: dict[str, list[BatchPart]] = {}
     for part in parts:
         of_name.setdefault(name_of(part).casefold(), []).append(part)
     findings = {}

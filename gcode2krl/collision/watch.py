@@ -14,7 +14,7 @@ from gcode2krl.cell.carried import standing, to_rest
 from gcode2krl.cell.carriers import rails_of, tables_of
 from gcode2krl.cell.sections.external import EXTERNAL_NAMES
 from gcode2krl.collision.along import Clearances, Way
-from gcode2krl.collision.bodies import CABLES, Part, capsules_of, parts_of
+from gcode2krl.collision.bodies import CABLES, Capsule, capsules_of, parts_of
 from gcode2krl.collision.contacts import Contacts
 from gcode2krl.collision.gaps import obstacle_gaps, placed
 from gcode2krl.collision.scene import Bodies, Obstacles
@@ -229,7 +229,7 @@ ITSELF = " of the arm itself"
 class _Setting(NamedTuple):
     """What is watched with a tool in the spindle."""
 
-    parts: list[Part]
+    parts: list[Capsule]
     bodies: Bodies
     pairs: list[Pair]
     names: list[tuple[str, str]]

@@ -66,7 +66,7 @@ def _end(wrong: Bools, start: int) -> int:
     return start + length if not wrong[start + length] else len(wrong)
 
 
-class _Rows(NamedTuple):
+class _RapidSamples(NamedTuple):
     """Samples of rapids."""
 
     row: Ints
@@ -85,13 +85,13 @@ class RapidContacts:
         self._blend_mm = blend_mm
         self._count = 0
         none, zero = np.zeros(0, dtype=np.int32), np.zeros(0)
-        self._rows = _Rows(np.zeros(0, dtype=np.int64), none, none, zero, zero, zero)
+        self._rows = _RapidSamples(np.zeros(0, dtype=np.int64), none, none, zero, zero, zero)
 
     def take(self, cut: "Cut", tool: Ints32) -> None:
         """Add the next samples."""
         rows = np.flatnonzero(cut.rapid)
         columns = (cut.source_line[rows], tool[rows], cut.step_mm[rows], cut.descent_mm[rows])
-        added = _Rows(self._count + rows, *columns, np.zeros(len(rows)))
+        added = _RapidSamples(self._count + rows, *columns, np.zeros(len(rows)))
         self._rows = followed(self._rows, added)
         self._count += len(tool)
 
@@ -120,7 +120,7 @@ class RapidContacts:
         ]
 
     @staticmethod
-    def _below_surface(rows: _Rows, first: Ints) -> Floats:
+    def _below_surface(rows: _RapidSamples, first: Ints) -> Floats:
         """Return how far (m,) rapids are below the surface that they met in the ``first`` row of a stretch.
 
         Material that one sample has cut off is missing for the next, so the descent is added.

@@ -220,7 +220,7 @@ class RawBox(NamedTuple):
     guessed: bool
 
 
-class _Rows(NamedTuple):
+class _UncutSamples(NamedTuple):
     """What is known of samples (m) before they are cut."""
 
     position_mm: Floats
@@ -246,7 +246,7 @@ class _Rows(NamedTuple):
 class Approach(NamedTuple):
     """Samples that are about to be cut."""
 
-    rows: _Rows
+    rows: _UncutSamples
     points: Points
     """The way along them."""
     ends: bool
@@ -256,7 +256,7 @@ class Approach(NamedTuple):
 class Contact(NamedTuple):
     """The same samples, and what is read at those that are done by then."""
 
-    rows: _Rows
+    rows: _UncutSamples
     engaged: Engaged
 
 
@@ -303,8 +303,8 @@ class Milling:
                 StockChecks(self._tools, outlook, cell.stock, self._before, toolpath.restart is None),
                 Uses(cell, outlook.numbers),
             )
-        self._last: _Rows | None = None
-        self._waiting: _Rows | None = None
+        self._last: _UncutSamples | None = None
+        self._waiting: _UncutSamples | None = None
         self._peaks = _Peaks(self._tools, self._law) if is_checked and has_peaks else None
 
     def take(self, motion: Motion, ends: bool) -> Forces:
@@ -363,7 +363,7 @@ class Milling:
         self._engagement.write_back(field)
         return field
 
-    def _rows(self, motion: Motion) -> _Rows:
+    def _rows(self, motion: Motion) -> _UncutSamples:
         toolpath, row = self._toolpath, np.clip(motion.move, 0, len(self._toolpath) - 1)
         position = turned(motion.position_mm, self._to_field)
         before = position[:1] if self._last is None else self._last.position_mm
@@ -371,7 +371,7 @@ class Milling:
         tool = np.searchsorted(self._numbers, motion.tool).astype(np.int32)
         rapid, spindle, teeth = toolpath.rapid[row], toolpath.spindle_rad_s[row], self._teeth[tool]
         programmed_mm_s = np.where(rapid, 0.0, toolpath.feed_mm_s[row])
-        return _Rows(
+        return _UncutSamples(
             position_mm=position,
             direction=turned(motion.direction, self._to_field),
             path_mm=motion.path_mm,
@@ -387,7 +387,7 @@ class Milling:
             descent_mm=np.maximum(-steps[:, 2], 0.0),
         )
 
-    def _points(self, rows: _Rows) -> Points:
+    def _points(self, rows: _UncutSamples) -> Points:
         """Return the path of the tip, with the turns between samples."""
         last = self._last
         if last is not None:
@@ -407,7 +407,7 @@ class Milling:
             wanted=way.read[new],
         )
 
-    def _forces(self, rows: _Rows, engaged: Engaged) -> Forces:
+    def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:
         found, checks = engaged.result, self._checks
         # a rapid through material is reported as a collision, and is not a cut
         force_N, moment_Nmm = (
@@ -440,7 +440,7 @@ class _Checks:
     stock: StockChecks
     uses: Uses
 
-    def take(self, rows: _Rows, engaged: Engaged, overlap_mm: Floats, forces: Forces) -> None:
+    def take(self, rows: _UncutSamples, engaged: Engaged, overlap_mm: Floats, forces: Forces) -> None:
         found = engaged.result
         cut = Cut(
             source_line=rows.source_line,

@@ -20,7 +20,7 @@ FAULTS: Final = "PF"
 ANY_WORD: Final = r"[^\s/]"
 
 
-class Finding(NamedTuple):
+class FindingKind(NamedTuple):
     """One kind of finding; `sentence` and `remedy` are filled in by `gcode2krl.gcode.sentences`."""
 
     name: str
@@ -40,10 +40,10 @@ def read() -> dict[str, Any]:
 
 
 @cache
-def all_findings() -> dict[int, Finding]:
+def all_findings() -> dict[int, FindingKind]:
     """Return number → finding."""
     rows = ((f"{table}.{name}", row) for table in TABLES for name, row in read()[table].items())
-    return {number: Finding(name, **row) for number, (name, row) in enumerate(rows) if row}
+    return {number: FindingKind(name, **row) for number, (name, row) in enumerate(rows) if row}
 
 
 def warnings() -> tuple[int, ...]:

@@ -229,7 +229,7 @@ class Program:
         self._count("main_words", self._ends[0])
 
     def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
-        flow = Flow(self._lines, word_of_row, _Rows(self._labels))
+        flow = Flow(self._lines, word_of_row, _LabelRows(self._labels))
         of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != findings.F.OK)
         for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
             start = int(self._lines["start"][row])
@@ -443,7 +443,7 @@ class Program:
         return next((file for file in reversed(self.files) if file.first_line <= line), self.files[0])
 
 
-class _Rows(dict[Label, int]):
+class _LabelRows(dict[Label, int]):
     """The row of every label; a new label gets the next."""
 
     def __init__(self, labels: dict[Label, int]) -> None:

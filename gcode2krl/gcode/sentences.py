@@ -8,7 +8,7 @@ from gcode2krl.errors import Issue
 from gcode2krl.gcode import findings
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.dialects import REASONS
-from gcode2krl.gcode.findings import Finding
+from gcode2krl.gcode.findings import FindingKind
 from gcode2krl.units import MM_PER_INCH
 
 _OF_CHARACTER = {
@@ -80,7 +80,7 @@ def make_issue(number: int, line: int, a: float, b: float = 0.0, c: float = 0.0,
     )
 
 
-def _texts(finding: Finding, a: float, b: float) -> tuple[str, str]:
+def _texts(finding: FindingKind, a: float, b: float) -> tuple[str, str]:
     """Return sentence and remedy of a finding, where they depend on what was found."""
     if finding.name in ("F.SAME_GROUP_G", "F.SAME_GROUP_M") and a == b:
         return f"{finding.name[-1]}{{g}} stands twice in the block", "keep one"  # it does not exclude itself

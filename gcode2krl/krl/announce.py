@@ -170,7 +170,7 @@ def pilot_force(source: Forecast) -> PilotForce:
     return force
 
 
-class Layout(NamedTuple):
+class TimedMotions(NamedTuple):
     """The motions of a program and when they run."""
 
     windows: Windows
@@ -202,9 +202,9 @@ class Planner:
         )
 
     @cached_property
-    def whole(self) -> Layout:
+    def whole(self) -> TimedMotions:
         """The program as it is, no motion cut."""
-        return Layout(self.windows, self.targets, self.joints)
+        return TimedMotions(self.windows, self.targets, self.joints)
 
     def announce(self, knots: Knots) -> PilotPlan | Issue:
         """Return the plan that announces the knots, or why there is none.
@@ -227,7 +227,7 @@ class Planner:
             outcome = outcome if isinstance(other, Issue) else other
         return outcome
 
-    def layouts(self, knots: Knots) -> Iterator[Layout]:
+    def layouts(self, knots: Knots) -> Iterator[TimedMotions]:
         """Yield the program as it is, and with its first motions cut, up to where that would cost time."""
         yield self.whole
         pieces = self._pieces(knots)
@@ -240,13 +240,13 @@ class Planner:
                 return
             pieces = pieces.before(slow - view(self.cell))
 
-    def all_in_time(self, knots: Knots, layout: Layout) -> bool:
+    def all_in_time(self, knots: Knots, layout: TimedMotions) -> bool:
         """Tell whether all these knots can be announced in time, and none too early."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True)
         in_time = (triggers.row >= 0) & (triggers.fire_s <= knots.time_s) & (sooner_s <= _MOST_SOONER_S)
         return bool(in_time.all()) and not self._too_many(triggers)
 
-    def announce_ending(self, knots: Knots, end_line: int, layout: Layout) -> PilotPlan | Issue:
+    def announce_ending(self, knots: Knots, end_line: int, layout: TimedMotions) -> PilotPlan | Issue:
         """Announce knots and, a lead before the last one, that none follows."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True, ends=True)
         if sooner_s.max(initial=0.0) > _MOST_SOONER_S or self._too_many(triggers):
@@ -257,7 +257,7 @@ class Planner:
         triggers, _ = self._place(knots, self.windows)
         return cut_for(triggers, self.windows, self.chain, self.targets, self.motion, self.cell)
 
-    def _cut(self, pieces: Pieces) -> tuple[Layout, int | None, Floats]:
+    def _cut(self, pieces: Pieces) -> tuple[TimedMotions, int | None, Floats]:
         """Return the program with pieces, the row of Targets from which on they cost time, and how much (n,).
 
         By the controller's model; more than half a cycle counts.
@@ -270,9 +270,9 @@ class Planner:
         slow = np.flatnonzero(later_s > _SAME_TIME * self.cell.controller.cycle_s)
         windows = windows_of(targets, chain, self.motion, self.cell)
         row = first + 1 + int(slow[0]) if len(slow) else None
-        return Layout(windows, targets, joints), row, later_s
+        return TimedMotions(windows, targets, joints), row, later_s
 
-    def _earlier(self, knots: Knots, most_s: float, layout: Layout) -> PilotPlan | Issue:
+    def _earlier(self, knots: Knots, most_s: float, layout: TimedMotions) -> PilotPlan | Issue:
         """Announce knots by triggers that are moved to earlier motions where too many would wait."""
         triggers, sooner_s = self._place(knots, layout.windows, spread=True)
         if sooner_s.max(initial=0.0) > most_s or self._too_many(triggers):
@@ -280,7 +280,7 @@ class Planner:
         return self._planned(knots, triggers, layout)
 
     def _planned(
-        self, knots: Knots, triggers: Triggers, layout: Layout, end_line: int | None = None
+        self, knots: Knots, triggers: Triggers, layout: TimedMotions, end_line: int | None = None
     ) -> PilotPlan | Issue:
         count = len(knots)
         late = np.flatnonzero((triggers.row[:count] < 0) | (triggers.fire_s[:count] > knots.time_s))

@@ -28,7 +28,7 @@ from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
 from gcode2krl.krl.controller_state import may_disturb
-from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
+from gcode2krl.krl.executed import Executed, StatementRun, executed_in, is_motion
 
 # Statements in the order of execution to columns of motions: speed and approximation in force, line.
 
@@ -219,7 +219,7 @@ class _Reader:
         self.others = [np.flatnonzero(~is_motion(scanned.kind)) for scanned in self.scanned]
         self.line_starts: dict[int, Ints] = {}
         self.issues: list[Issue] = []
-        self.blocks: dict[tuple[int, str], Block] = {}
+        self.blocks: dict[tuple[int, str], StatementRun] = {}
         self.executed: set[tuple[int, str]] = set()
         self.declarations: list[Statement] = []
         self.def_lines: dict[str, int] = {}
@@ -340,7 +340,7 @@ class _Reader:
                 found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
         return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
 
-    def _texts_of(self, block: Block) -> tuple[str, ...]:
+    def _texts_of(self, block: StatementRun) -> tuple[str, ...]:
         rows = range(block.start, block.end)
         return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
@@ -386,11 +386,11 @@ class _Reader:
                     continue
                 if (file, name) in self.blocks:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
-                self.blocks.setdefault((file, name), Block(file, start, int(row)))
+                self.blocks.setdefault((file, name), StatementRun(file, start, int(row)))
                 name = ""
         if name:
             self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
-            self.blocks.setdefault((file, name), Block(file, start, len(scanned.kind)))
+            self.blocks.setdefault((file, name), StatementRun(file, start, len(scanned.kind)))
 
     def _called(self, file: int, name: str) -> tuple[int, str] | None:
         """Return the subprogram that a file means by a name: its own, else the one a file is named after."""
@@ -400,7 +400,7 @@ class _Reader:
         others = (k for k, other in enumerate(self.names) if Path(other).stem.upper() == name)
         return next(((k, name) for k in others if (k, name) in self.blocks), None)
 
-    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[Block]:
+    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[StatementRun]:
         """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
         self.executed.add(block)
         file, start, end = self.blocks[block]
@@ -416,16 +416,16 @@ class _Reader:
                     self._issue(
                         "krl-structure", int(scanned.line[row]), f"{text[:40]!r} behind statements", file
                     )
-                yield Block(file, at, int(row))
+                yield StatementRun(file, at, int(row))
                 at = int(row) + 1
             elif call and (called := self._called(file, call.group(1))):
-                yield Block(file, at, int(row))
+                yield StatementRun(file, at, int(row))
                 at = int(row) + 1
                 if depth > 20:
                     self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
                     return
                 yield from self._execute(called, depth + 1)
-        yield Block(file, at, end)
+        yield StatementRun(file, at, end)
 
     def _last_declaration(self, file: int, start: int, end: int) -> int:
         """Return the last row of the run of declarations with which a block begins."""

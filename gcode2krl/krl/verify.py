@@ -19,7 +19,7 @@ from gcode2krl.exchange.html import block, text_table
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.cell_hashes import StatedCell
-from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
+from gcode2krl.krl.composition import MESSAGE_SETUP, TextLayout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
@@ -209,7 +209,7 @@ def verify_krl(
     alone = declares_itself(program)
     arcs = tuple(arcs_of(targets)) if len(program.circ_rows) else ()
     splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
-    layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
+    layout = TextLayout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
     expected = {name: b"".join(pieces) for name, pieces in composed.items()}
     if not alone:

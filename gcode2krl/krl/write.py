@@ -16,7 +16,7 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import TextLayout, compose
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.pilot_text import PilotText
@@ -152,7 +152,7 @@ def write_krl(
     arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
     found = [*of_name, *about_curves, *forecast.issues]
     issues = list(released(found, allow, strict))
-    layout = Layout(
+    layout = TextLayout(
         guard,
         split if file is not None else "defs",
         single_file=file is None,
@@ -202,7 +202,7 @@ class _Writing:
     """Where a program goes, how it is laid out, and the Toolpath that it is held against."""
 
     files: ProgramFiles
-    layout: Layout
+    layout: TextLayout
     cell: Cell
     original: Toolpath | None
 

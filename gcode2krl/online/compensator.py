@@ -162,7 +162,7 @@ LoadFrame = Literal["base", "tcp", "sensor"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Samples:
+class CycleInputs:
     """Inputs, a row for each cycle."""
 
     time_s: Floats
@@ -181,11 +181,11 @@ class Samples:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def rows(self, start: int, end: int) -> "Samples":
+    def rows(self, start: int, end: int) -> "CycleInputs":
         """Return some rows."""
         told = Announced(*(column[start:end] for column in self.told))
         own = {f.name: getattr(self, f.name)[start:end] for f in fields(self) if f.name != "told"}
-        return Samples(**own, told=told)
+        return CycleInputs(**own, told=told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,13 +289,13 @@ def start(device: Compensator) -> State:
     )
 
 
-def step(device: Compensator, state: State, sample: Samples) -> tuple[State, Corrections]:
+def step(device: Compensator, state: State, sample: CycleInputs) -> tuple[State, Corrections]:
     """Return the state after one cycle, and its correction; `sample` has one row."""
     return stream(device, state, sample)
 
 
 def stream(
-    device: Compensator, state: State, samples: Samples, held: Bools | None = None
+    device: Compensator, state: State, samples: CycleInputs, held: Bools | None = None
 ) -> tuple[State, Corrections]:
     """Return the state after all rows, and their corrections; ``held`` rows (n,) repeat the last one.
 
@@ -348,7 +348,7 @@ def _tool_rotation(q_rad: Floats, cell: Cell, tool: int) -> Floats:
     return turned
 
 
-def _load_base(device: Compensator, samples: Samples, rotation: Floats) -> Floats:
+def _load_base(device: Compensator, samples: CycleInputs, rotation: Floats) -> Floats:
     """Return force and moment (n, 6) about the tip along ``$BASE``."""
     force, moment = samples.load[:, :3], samples.load[:, 3:]
     if device.load_frame == "base":

@@ -9,7 +9,7 @@ from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import Issue
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
-from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
+from gcode2krl.online.twin import CASES, Case, Twin, TwinRun, as_settings, simulate
 from gcode2krl.progress import Progress, unheard
 
 MATTERS_MM = 0.01
@@ -78,10 +78,10 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-Runs = Mapping[Case, Run]
+Runs = Mapping[Case, TwinRun]
 
 
-def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, Run]:
+def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, TwinRun]:
     """Return the four cases."""
     runs = {}
     for case in CASES:
@@ -165,11 +165,11 @@ def findings(twin: Twin, runs: Runs, judged: Judged) -> list[Issue]:
     return issues
 
 
-def _worst(run: Run, where: Any) -> float | None:
+def _worst(run: TwinRun, where: Any) -> float | None:
     return float(run.normal_mm[where].max()) if where.any() else None
 
 
-def _depth(twin: Twin, run: Run, judged: Judged) -> float | None:
+def _depth(twin: Twin, run: TwinRun, judged: Judged) -> float | None:
     """Return the largest deviation along the tool axis in mm."""
     if not judged.counts.any():
         return None

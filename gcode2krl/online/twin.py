@@ -21,7 +21,7 @@ from gcode2krl.errors import input_error
 from gcode2krl.online.compensator import (
     Compensator,
     Corrections,
-    Samples,
+    CycleInputs,
     build_compensator,
     joints_at,
     start,
@@ -71,7 +71,7 @@ class World:
     seed: int = 1
 
 
-class Run(NamedTuple):
+class TwinRun(NamedTuple):
     """One case of the twin, n samples."""
 
     case: Case
@@ -138,7 +138,7 @@ def twin_of(prediction: Prediction, settings: Online, world: World) -> Twin:
     return Twin(cell, settings, world, motion, joints, forces, knots, header, int(tools[0]))
 
 
-def simulate(twin: Twin, case: Case) -> Run:
+def simulate(twin: Twin, case: Case) -> TwinRun:
     """Return one case: no compensation, Cartesian, Cartesian with pilot, axis-specific with pilot."""
     time_s = twin.motion.time_s / twin.world.feed_scale
     force, moment = _late(twin, time_s)
@@ -165,7 +165,7 @@ def simulate(twin: Twin, case: Case) -> Run:
     velocity = np.gradient(twin.motion.position_mm, twin.motion.time_s, axis=0)
     normal = np.linalg.norm(project_normal(tip, velocity), axis=1)
     needed = np.linalg.norm(project_normal(bent, velocity), axis=1)
-    return Run(case, time_s, tip, normal, shift, needed, force, corrections, rounds)
+    return TwinRun(case, time_s, tip, normal, shift, needed, force, corrections, rounds)
 
 
 def as_settings(twin: Twin) -> dict[str, float | str | bool]:
@@ -232,8 +232,8 @@ def _sensed(twin: Twin, force: Floats, moment: Floats, noise: Floats, time_s: Fl
     return np.stack([np.interp(at, time_s, column) for column in load.T], axis=1)
 
 
-def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: Announced) -> Samples:
-    return Samples(
+def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: Announced) -> CycleInputs:
+    return CycleInputs(
         time_s=time_s,
         load=load,
         q_rad=present,

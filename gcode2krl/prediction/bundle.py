@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.exchange import Columns, Findings, Table
+from gcode2krl.exchange import ColumnFrame, Findings, Table
 from gcode2krl.exchange.findings import counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.exchange.views import view
@@ -44,7 +44,7 @@ def joined_samples(
     deflection: Deflection | None,
     added: Mapping[str, Floats],
     clearance: Clearance | None = None,
-) -> Columns:
+) -> ColumnFrame:
     """Return the samples of a motion with what every stage says of them; see `Prediction.samples`."""
     if motion is None:
         raise input_error("prediction-empty", "the prediction has no motion", "predict the part again")
@@ -75,7 +75,7 @@ def joined_samples(
         columns |= {"force_N": lengths(forces.force_base_N), **of_forces}
     if deflection is not None:
         columns |= {"deflection_mm": lengths(deflection.deflection_base_mm), **deflection.columns()}
-    return Columns({**columns, **added}, "samples")
+    return ColumnFrame({**columns, **added}, "samples")
 
 
 def pass_numbers(rapid: Bools, tool: Ints32) -> Ints32:
@@ -324,7 +324,7 @@ class Prediction:
         """
         return Plots(partial(_drawn, self))
 
-    def samples(self) -> Columns:
+    def samples(self) -> ColumnFrame:
         """Return all stages in one table, a row a time sample.
 
         ``source_line`` is the line of the G-code; ``kind`` of the move ``rapid``, ``line``, ``arc`` or
@@ -389,7 +389,7 @@ class Prediction:
         """
         return cls(**read_folder(Path(folder)))
 
-    def _tables_on_disk(self) -> dict[str, Columns]:
+    def _tables_on_disk(self) -> dict[str, ColumnFrame]:
         """Return the tables as they are saved: Motion with what stands beside it."""
         tables = {"toolpath": self.toolpath.columns(), "targets": self.targets.columns()}
         if self.motion is not None:
@@ -402,7 +402,7 @@ class Prediction:
             for table in beside:
                 tables["motion"] |= table.columns()
             tables["motion"] |= self.added
-        return {name: Columns(columns) for name, columns in tables.items()}
+        return {name: ColumnFrame(columns) for name, columns in tables.items()}
 
     def _record_bytes(self, hashes: Mapping[str, str]) -> bytes:
         head = head_of(self.inputs, self.issues, self.cell, self._figures().as_dict(), hashes)

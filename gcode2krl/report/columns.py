@@ -19,7 +19,7 @@ _FILLED = 0.05
 """Share of filled columns above which a line says nothing."""
 
 
-class Columns(NamedTuple):
+class TimeColumns(NamedTuple):
     """Which rows lie in which column: c columns of equal time."""
 
     edge_s: Floats

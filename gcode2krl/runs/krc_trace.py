@@ -47,7 +47,7 @@ class Angles(NamedTuple):
     """(n, 6)"""
 
 
-class _Fit(NamedTuple):
+class _DriveFit(NamedTuple):
     factors: Floats
     """(6,)"""
     zero_deg: float
@@ -90,9 +90,9 @@ def _axis(
     wanted: Angles | None,
     lag_s: float,
     gear_ratio: Sequence[float] | None,
-) -> tuple[_Fit, str]:
+) -> tuple[_DriveFit, str]:
     """Return the map from motor angles to the angle of one axis, NaN where it is unknown."""
-    as_is, unknown = _Fit(np.eye(6)[axis], 0.0, 0.0), _Fit(np.full(6, np.nan), 0.0, 0.0)
+    as_is, unknown = _DriveFit(np.eye(6)[axis], 0.0, 0.0), _DriveFit(np.full(6, np.nan), 0.0, 0.0)
     if wanted is not None and _moves(wanted.deg[:, axis]) and _moves(drive.deg[:, axis]):
         alone = _fit(axis, [axis], drive, wanted, lag_s)
         if abs(alone.factors[axis] - 1.0) < _SAME_SCALE and alone.rms_deg < _WORST_FIT_DEG:
@@ -106,7 +106,7 @@ def _axis(
         return as_is, ""
     if gear_ratio is None:
         return unknown, "motor angle of unknown gear ratio, left out; record AxisPos_CmdIpo of a moving axis"
-    fit = _Fit(np.eye(6)[axis] / gear_ratio[axis], 0.0, 0.0)
+    fit = _DriveFit(np.eye(6)[axis] / gear_ratio[axis], 0.0, 0.0)
     return fit, f"motor angle over the cell's gear ratio {gear_ratio[axis]:g}; sign and zero unknown"
 
 
@@ -125,7 +125,7 @@ def _common_lag(drive: Angles, wanted: Angles) -> float:
     return float(lags[int(np.argmin([misfit(float(lag)) for lag in lags]))])
 
 
-def _fit(axis: int, motors: list[int], drive: Angles, wanted: Angles, lag_s: float) -> _Fit:
+def _fit(axis: int, motors: list[int], drive: Angles, wanted: Angles, lag_s: float) -> _DriveFit:
     """Return the least squares fit of one axis to some motors; motors at rest are ignored."""
     motors = [n for n in motors if _moves(drive.deg[:, n])]
     every = max(1, len(wanted.time_s) // _MOST_SAMPLES)
@@ -133,16 +133,16 @@ def _fit(axis: int, motors: list[int], drive: Angles, wanted: Angles, lag_s: flo
     x = np.stack([np.interp(time_s, drive.time_s, drive.deg[:, n]) for n in motors], axis=1)
     good = (time_s >= drive.time_s[0]) & (time_s <= drive.time_s[-1]) & np.isfinite(y + x.sum(axis=1))
     if np.count_nonzero(good) <= len(motors) + 1:
-        return _Fit(np.zeros(6), 0.0, float("inf"))
+        return _DriveFit(np.zeros(6), 0.0, float("inf"))
     x, y = x[good], y[good]
     factors = np.linalg.lstsq(x - x.mean(axis=0), y - y.mean(), rcond=None)[0]
     zero = float(y.mean() - x.mean(axis=0) @ factors)
     spread = np.zeros(6)
     spread[motors] = factors
-    return _Fit(spread, zero, float(np.sqrt(np.mean((y - x @ factors - zero) ** 2))))
+    return _DriveFit(spread, zero, float(np.sqrt(np.mean((y - x @ factors - zero) ** 2))))
 
 
-def _applied(fit: _Fit, motor_deg: Floats) -> Floats:
+def _applied(fit: _DriveFit, motor_deg: Floats) -> Floats:
     used = np.flatnonzero(fit.factors)
     result: Floats = motor_deg[:, used] @ fit.factors[used] + fit.zero_deg
     return result

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference
-from gcode2krl.batch.written.part import Part
+from gcode2krl.batch.written.part import PartResult
 from gcode2krl.report.page.content import duration
 
 UNKNOWN = "–"
@@ -49,7 +49,7 @@ def deflection(value_mm: float | None) -> str:
     return UNKNOWN if value_mm is None else f"{value_mm:.3f} mm"
 
 
-def headline(parts: Sequence[Part]) -> str:
+def headline(parts: Sequence[PartResult]) -> str:
     """Return how many parts were written, refused and not understood."""
     verdicts = [part.verdict for part in parts]
     written, *others = [(verdicts.count(verdict), verdict) for verdict in VERDICTS]
@@ -61,7 +61,7 @@ def headline(parts: Sequence[Part]) -> str:
     return f"{written[0]:,} of {_counted(len(parts), 'part')} written, {named}"
 
 
-def demonstration(parts: Sequence[Part]) -> str:
+def demonstration(parts: Sequence[PartResult]) -> str:
     """Return the warning that parts were translated for the demonstration cell, empty where none was."""
     count = sum(part.is_demonstration for part in parts)
     if not count:
@@ -73,7 +73,7 @@ def demonstration(parts: Sequence[Part]) -> str:
     )
 
 
-def facts(parts: Sequence[Part]) -> list[Fact]:
+def facts(parts: Sequence[PartResult]) -> list[Fact]:
     """Return the figures of a whole run."""
     written = [part for part in parts if part.is_written]
     cached = sum(part.cached for part in parts)
@@ -89,8 +89,8 @@ def facts(parts: Sequence[Part]) -> list[Fact]:
 
 def _largest(
     name: str,
-    parts: Iterable[Part],
-    figure: Callable[[Part], float | None],
+    parts: Iterable[PartResult],
+    figure: Callable[[PartResult], float | None],
     words: Callable[[float | None], str],
 ) -> list[Fact]:
     known = [(value, part.name) for part in parts if (value := figure(part)) is not None]

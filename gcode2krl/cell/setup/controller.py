@@ -282,7 +282,7 @@ class ExternalData:
 
 
 @dataclass(frozen=True)
-class Controller:
+class ArchivedController:
     """What an archive states; None or empty where it does not."""
 
     source: str
@@ -303,7 +303,7 @@ class Controller:
     """``8.3``, as the archive's own ``am.ini`` has it (``Version=V8.3.29``)."""
 
 
-def read_controller(path: Path) -> Controller:
+def read_controller(path: Path) -> ArchivedController:
     """Read the archive of a controller, a folder or a zip; raises `NotUnderstoodError` where it cannot."""
     lists = read_archive(path)
     version = lists.pop(VERSION, None)
@@ -314,11 +314,11 @@ def read_controller(path: Path) -> Controller:
     return replace(controller_of(values, path.name or str(path)), kss=stated[1] if stated else "")
 
 
-def controller_of(values: Mapping[str, Value], source: str) -> Controller:
+def controller_of(values: Mapping[str, Value], source: str) -> ArchivedController:
     """Return what the values of the data lists mean."""
     trafo_name = str(values.get("$TRAFONAME[]", "")).removeprefix("#").strip()
     lengths = _lengths(values)
-    return Controller(
+    return ArchivedController(
         source=source,
         trafo_name=trafo_name,
         model=_model(_machine_name(values), trafo_name, lengths),

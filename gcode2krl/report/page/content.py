@@ -19,7 +19,7 @@ from gcode2krl.errors import Issue, Told, told
 from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.page.losses import (
-    Place,
+    NotableSample,
     Window,
     is_worth_saying,
     lost_time,
@@ -28,7 +28,7 @@ from gcode2krl.report.page.losses import (
     worst_windows,
 )
 from gcode2krl.report.page.passes import passes_of
-from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
+from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import Toolpath
@@ -130,7 +130,7 @@ class Worst:
 
     label: str
     unit: str
-    places: list[Place]
+    places: list[NotableSample]
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def content_of_refused(
 def _content(
     title: str,
     verdict: str,
-    whole: Samples,
+    whole: PageSamples,
     issues: tuple[Issue, ...],
     cell: Cell | None,
     text: str | None,
@@ -319,7 +319,7 @@ def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:
     )
 
 
-def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> Content:
+def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples) -> Content:
     """Return a page with the differences to the nominal part, as a table and as solids."""
     rows = thinned(whole)
     found = [
@@ -342,7 +342,7 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> 
 
 
 def _carried(
-    whole: Samples, shown: Samples, cell: Cell | None
+    whole: PageSamples, shown: PageSamples, cell: Cell | None
 ) -> tuple[Cell | None, dict[str, tuple[Any, float]]]:
     """Return the cell as it is drawn, and columns with what external axes move: robot root and ``$WORLD``.
 
@@ -363,7 +363,7 @@ def _carried(
     return cell, columns
 
 
-def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:
+def _near(shown: PageSamples, cell: Cell | None) -> dict[str, Any] | None:
     """Return who may be near what, and up to which distance that is a warning."""
     if shown.near is None or cell is None:
         return None
@@ -371,7 +371,7 @@ def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:
     return {**names, "clearance": cell.collision.clearance_mm}
 
 
-def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:
+def _columns(shown: PageSamples, number: Ints) -> dict[str, tuple[Any, float]]:
     """Return the columns that the page carries, with the steps to which they are rounded."""
     columns: dict[str, tuple[Any, float]] = {"time": (shown.time_s, 1e-4)}
     columns |= {axis: (shown.position_mm[:, k], 1e-3) for k, axis in enumerate("xyz")}
@@ -398,13 +398,13 @@ def _on_page(window: Window, rows: Ints) -> Window:
     return replace(window, row=_nearest(rows, window.row))
 
 
-def _worst(quantity: Quantity, whole: Samples, rows: Ints) -> Worst:
+def _worst(quantity: Quantity, whole: PageSamples, rows: Ints) -> Worst:
     sign = -1.0 if quantity.is_low_bad else 1.0
     considered = np.where(whole.rapid & (not quantity.is_margin), np.nan, sign * quantity.values)
     if not quantity.is_margin:
         considered = np.where(considered > 0.0, considered, np.nan)
     places = worst_places(considered, whole.time_s, whole.line)
-    own = [Place(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
+    own = [NotableSample(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
     return Worst(quantity.label, quantity.unit, own)
 
 
@@ -430,7 +430,7 @@ def _facts(prediction: Prediction) -> list[tuple[str, str]]:
     return facts
 
 
-def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
+def _not_known(whole: PageSamples, cell: Cell | None) -> list[str]:
     known = {quantity.name for quantity in whole.quantities}
     missing = []
     if not whole.is_timed:
@@ -446,7 +446,7 @@ def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
     return missing
 
 
-def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
+def _collisions(whole: PageSamples, cell: Cell | None) -> list[str]:
     """Return what is not checked for collisions; where something is, also what."""
     tools = [int(number) for number in np.unique(whole.tool)]
     scope = None
@@ -461,7 +461,7 @@ def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
     ]
 
 
-def _sentence(whole: Samples, lost_s: float, findings: Told, verdict: str) -> str:
+def _sentence(whole: PageSamples, lost_s: float, findings: Told, verdict: str) -> str:
     if verdict in ("refused", "not understood"):
         return _refusal(findings, verdict)
     length_m = float(np.linalg.norm(np.diff(whole.position_mm, axis=0), axis=1).sum()) / MM_PER_M

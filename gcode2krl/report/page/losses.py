@@ -19,7 +19,7 @@ _STILL_MM_S = 1e-3
 
 
 @dataclass(frozen=True)
-class Place:
+class NotableSample:
     """A sample that is worth a look."""
 
     row: int
@@ -101,15 +101,15 @@ def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -
     return found
 
 
-def worst_places(values: Floats, time_s: Floats, line: Ints32, most: int = 3) -> list[Place]:
+def worst_places(values: Floats, time_s: Floats, line: Ints32, most: int = 3) -> list[NotableSample]:
     """Return the samples of the largest values, the worst first, apart in time and in different lines."""
     apart_s = _APART * float(time_s[-1] - time_s[0])
     left = np.where(np.isfinite(values), values, -np.inf)
-    found: list[Place] = []
+    found: list[NotableSample] = []
     while len(found) < most:
         row = int(np.argmax(left))
         if not np.isfinite(left[row]):
             break
-        found.append(Place(row, float(values[row]), float(time_s[row]), int(line[row])))
+        found.append(NotableSample(row, float(values[row]), float(time_s[row]), int(line[row])))
         left[(np.abs(time_s - time_s[row]) <= apart_s) | (line == line[row])] = -np.inf
     return found

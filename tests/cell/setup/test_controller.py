@@ -12,7 +12,7 @@ from gcode2krl.cell.setup import controller
 from gcode2krl.cell.setup.answers import completed
 from gcode2krl.cell.setup.cell_text import text_of_cell
 from gcode2krl.cell.setup.controller import (
-    Controller,
+    ArchivedController,
     ExternalData,
     controller_of,
     krl_values,
@@ -79,7 +79,7 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
     [("8.6", None, "8.6"), ("", None, ""), ("8.6", "8.7", "8.7"), ("8.6", "unknown", ""), ("", "8.5", "8.5")],
 )
 def test_the_system_software_is_that_of_the_archive_unless_it_is_answered(stated, answer, written):
-    controller = Controller(source="", kss=stated)
+    controller = ArchivedController(source="", kss=stated)
     text = text_of_cell(
         completed({} if answer is None else {"kss": answer}, controller), controller, "s.json"
     )
