@@ -11,7 +11,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters, size_from_zero
+from gcode2krl.effects.parameter import DIRECTION, Parameter, direction_parameters, size_from_zero
 from gcode2krl.effects.signals import Signals
 from gcode2krl.units import RAD_PER_DEG
 
@@ -71,7 +71,6 @@ class BoltRatchet(_Ratchet):
             start=150.0,
             grid=(80.0, 300.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="friction of a loose clamp some 10 N, of a bolted flange kilonewtons",
         ),
         *direction_parameters("any"),
@@ -115,7 +114,6 @@ class JointRatchet(_Ratchet):
             start=200.0,
             grid=(100.0, 1000.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="loose clamps of a wrist some 10 N·m, flanges of a large arm kilonewton metres",
         ),
     )
