@@ -55,9 +55,9 @@ class Plan:
     @classmethod
     def of(cls, toolpath: Toolpath, targets: Targets, cell: Cell) -> "Plan":
         """Return the plan of targets as they are, nothing added to their findings."""
-        joints, found = robot.follow(targets, cell, conditioning=False)
+        joints, issues = robot.follow(targets, cell, conditioning=False)
         ways = tuple(ways_beside(targets, joints.q_rad, cell))
-        return cls(toolpath, cell, targets, replace(joints, issues=found), ways)
+        return cls(toolpath, cell, targets, replace(joints, issues=issues), ways)
 
     def judged(self) -> "Plan":
         """Return the plan whose targets have the findings on reach, limits, singularities and table too.
@@ -226,13 +226,13 @@ def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Foreca
                 samples.take(block.motion, block.line, block.forces, block.deflection)
     outcome = run.outcome
     known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
-    found = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
+    groups = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
     last = course.at(np.array([course.count - 1]))
     return Forecast(
         toolpath=plan.toolpath,
         targets=plan.targets,
         cell=plan.cell,
-        issues=(*plan.targets.issues, *run.motion.issues, *itertools.chain.from_iterable(found)),
+        issues=(*plan.targets.issues, *run.motion.issues, *itertools.chain.from_iterable(groups)),
         time_s=float(last.time_s[0]),
         path_mm=float(last.path_mm[0]),
         loads=figures.figures(with_deflection=bends) if known else None,

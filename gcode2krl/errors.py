@@ -67,8 +67,8 @@ class Issue:
         entry = None if self.remedy else all_codes().get(self.code)
         if entry is None:
             return self.remedy
-        first, _, rest = entry.remedy.rstrip(".").partition(" ")
-        return f"{first.lower() if first[1:].islower() else first} {rest}"
+        first, _, others = entry.remedy.rstrip(".").partition(" ")
+        return f"{first.lower() if first[1:].islower() else first} {others}"
 
     def text(self, source: str = "", also: str = "") -> str:
         """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.

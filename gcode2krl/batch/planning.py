@@ -94,14 +94,18 @@ def _read_cell(part: BatchPart) -> _Cell:
 
 
 def _planned(part: BatchPart, cell: _Cell, order: Order, page: str) -> Planned:
-    own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
+    of_part = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
     try:
         size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
-    key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 else ""
-    inputs = (part.file, *cell.files, *(subprogram_files(own.part, own.search) if sha256 else ()))
-    return Planned(part, Task(own, page), inputs, size_bytes, sha256, cell.sha256, key)
+    key = key_of(sha256, cell.sha256, dict(_settings(of_part, page))) if sha256 else ""
+    inputs = (
+        part.file,
+        *cell.files,
+        *(subprogram_files(of_part.part, of_part.search) if sha256 else ()),
+    )
+    return Planned(part, Task(of_part, page), inputs, size_bytes, sha256, cell.sha256, key)
 
 
 def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:

@@ -55,18 +55,18 @@ def run_batch(
     """
     all_bytes = sum(map(_weight, planned))
     done_bytes = 0.0
-    left = []
+    to_compute = []
     for one in planned:
         record = _from_cache(one, out, cache)
         if record is None:
-            left.append(one)
+            to_compute.append(one)
             continue
         done_bytes += _weight(one)
         yield Line(record, done_bytes / all_bytes)
-    for one, record in _computed(left, out, workers, cache):
+    for one, record in _computed(to_compute, out, workers, cache):
         done_bytes += _weight(one)
         yield Line(record, done_bytes / all_bytes)
-    if cache is not None and left:
+    if cache is not None and to_compute:
         cache.prune()
 
 

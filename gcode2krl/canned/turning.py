@@ -109,8 +109,8 @@ def _is_clear(tilt_rad: Floats, pose: Pose, place: ProgramPlace, cell: Cell) -> 
     position_mm = np.repeat(pose.position_mm[None], len(quaternion), axis=0)
     branches = robot.inverse(position_mm, quaternion, cell, place.tool)
     off = branches[0] - pose.q_rad
-    own = int(np.nanargmin(np.abs(np.sin(off / 2.0)).sum(axis=1)))
-    q_rad = np.unwrap(np.concatenate([pose.q_rad[None], branches[1:, own]]), axis=0)
+    branch = int(np.nanargmin(np.abs(np.sin(off / 2.0)).sum(axis=1)))
+    q_rad = np.unwrap(np.concatenate([pose.q_rad[None], branches[1:, branch]]), axis=0)
     if not np.isfinite(q_rad).all() or (np.abs(q_rad[:, 4]) < _CLEAR_RAD).any():
         return False
     limits_deg = cell.robot.limits.q_deg

@@ -109,10 +109,10 @@ def _refuse_existing(cell_path: Path, force: bool) -> None:
 
 def _is_our_schema(path: Path) -> bool:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        schema = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(found, dict) and found.get("title") == "gcode2krl cell file"
+    return isinstance(schema, dict) and schema.get("title") == "gcode2krl cell file"
 
 
 def _resolved(text: str, cell_path: Path) -> "Cell":

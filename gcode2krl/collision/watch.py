@@ -217,8 +217,8 @@ class _Found:
 
 def _single(shapes: Obstacles, number: int) -> Obstacles:
     """Return one obstacle of several, with the triangles of all."""
-    own = slice(number, number + 1)
-    return shapes._replace(kind=shapes.kind[own], numbers=shapes.numbers[own], tree=shapes.tree[own])
+    row = slice(number, number + 1)
+    return shapes._replace(kind=shapes.kind[row], numbers=shapes.numbers[row], tree=shapes.tree[row])
 
 
 HORIZON_MM = 50.0
@@ -326,9 +326,9 @@ class Watch:
                 skip = len(self._last[0])  # the new way begins where the old one ended
                 q, at = (np.concatenate(pair) for pair in zip(self._last, (q, at), strict=True))
                 lines = np.concatenate([lines[:skip], lines])
-            found = self._way.take(q, self._shift_mm(at))
-            self._contacts.take(found, setting.names, lines, stand.to_base)
-            gap[rows], near[rows] = found.gap_mm[skip:], setting.places[found.pair[skip:]]
+            clearance = self._way.take(q, self._shift_mm(at))
+            self._contacts.take(clearance, setting.names, lines, stand.to_base)
+            gap[rows], near[rows] = clearance.gap_mm[skip:], setting.places[clearance.pair[skip:]]
             if is_turning:
                 carried = self._carried(number, against_raw=False, is_ptp=False)
                 seen = self._take_turning(carried, q_rad, external, lines[skip:], slice(start, end))
@@ -369,15 +369,15 @@ class Watch:
         columns, stand = self._table_columns, self._stand(external[-1])
         turns = bool((external[:, columns] != external[-1, columns]).any())
         setting = self._held(tool, against_raw=against_raw, is_ptp=is_ptp, turns=turns)
-        found = self._new_way(setting, stand, is_sampled=not is_ptp).take(q_rad, self._shift_mm(external))
+        clearance = self._new_way(setting, stand, is_sampled=not is_ptp).take(q_rad, self._shift_mm(external))
         lines = np.full(len(q_rad), line, dtype=np.int32)
-        self._contacts.take(found, setting.names, lines, stand.to_base, words)
+        self._contacts.take(clearance, setting.names, lines, stand.to_base, words)
         if not turns:
-            return found
+            return clearance
         carried = self._carried(tool, against_raw=against_raw, is_ptp=is_ptp)
         seen = self._turn(carried).take(q_rad, external)
         self._contacts.take(seen, carried.names, lines, self._rest_to_base, words)
-        return seen if seen.hits else found
+        return seen if seen.hits else clearance
 
     def _take_turning(
         self, carried: "_Setting", q_rad: Floats, external: Floats, lines: Ints32, rows: slice
@@ -390,10 +390,10 @@ class Watch:
         )
         q, at = (np.concatenate([b, each[rows]]) for b, each in zip(before, (q_rad, external), strict=True))
         skip = len(q) - len(lines)
-        found = self._turn(carried).take(q, at)
+        clearance = self._turn(carried).take(q, at)
         all_lines = np.concatenate([lines[:skip], lines])
-        self._contacts.take(found, carried.names, all_lines, self._rest_to_base)
-        return replace(found, gap_mm=found.gap_mm[skip:], pair=found.pair[skip:])
+        self._contacts.take(clearance, carried.names, all_lines, self._rest_to_base)
+        return replace(clearance, gap_mm=clearance.gap_mm[skip:], pair=clearance.pair[skip:])
 
     def _turn(self, carried: "_Setting") -> Turning:
         shapes = self._stand(self._cell.external_rest()).around.shapes

@@ -67,8 +67,8 @@ class Contact(NamedTuple):
         motion, _, forces, _ = evaluated
         path_mm, sample = ways.place(motion).distinct()
         air: Bools = np.append(False, ~np.asarray(forces.force_base_N[sample].any(axis=1)))
-        beside = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
-        return cls(path_mm, _distance(path_mm, beside[1:]))
+        near_air = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
+        return cls(path_mm, _distance(path_mm, near_air[1:]))
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""

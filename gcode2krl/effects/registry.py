@@ -136,10 +136,10 @@ def parse(text: str, known: Library, cell: Cell) -> Applied:
     A size that is not given has no effect, a shape its typical value. Components of a vector stand between
     slashes, ``direction=0/0/1``. Raises an input error that names what is allowed.
     """
-    name, _, rest = (part.strip() for part in text.partition(":"))
+    name, _, values = (part.strip() for part in text.partition(":"))
     target: Target = None
     given: dict[str, Any] = {}
-    for item in filter(None, (part.strip() for part in rest.split(","))):
+    for item in filter(None, (part.strip() for part in values.split(","))):
         key, equals, value = (part.strip() for part in item.partition("="))
         if not equals or not key or not value:
             raise _wrong(text, f"found {item!r}, allowed: key=value", _FORM)
@@ -203,8 +203,8 @@ def _check_target(where: str, effect: Effect, target: Target, cell: Cell) -> Non
     if targets == (None,):
         raise _wrong(where, f"found target {target}, but {effect.name} has no target", "leave it out")
     allowed = ", ".join(str(one) for one in targets)
-    found = "no target" if target is None else f"target {target!r}"
-    raise _wrong(where, f"found {found}, allowed for {effect.name}: {allowed}", f"target={targets[0]}")
+    given = "no target" if target is None else f"target {target!r}"
+    raise _wrong(where, f"found {given}, allowed for {effect.name}: {allowed}", f"target={targets[0]}")
 
 
 def _components(where: str, effect: Effect, key: str, value: Any) -> Iterator[tuple[Parameter, float]]:

@@ -75,8 +75,8 @@ _NOTES = {
 
 def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
     """Return the file lines that the findings and notes so far speak of."""
-    own = {int(line) for line in found["line"]}
-    return own | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
+    lines = {int(line) for line in found["line"]}
+    return lines | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
 
 
 def found_issues(
@@ -100,8 +100,8 @@ def found_issues(
         issues.append(Issue(severity, "more", 0, f"{dropped} more findings", "mend these first"))
     if counts["consequences"]:
         count = int(counts["consequences"])
-        rest = "1 more finding rests" if count == 1 else f"{count} more findings rest"
-        sentence = f"{rest} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
+        what = "1 more finding rests" if count == 1 else f"{count} more findings rest"
+        sentence = f"{what} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
         issues.append(Issue("note", "consequences", 0, sentence, "mend the errors, then read again"))
     return issues
 
@@ -125,9 +125,9 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
     message, remedy = issue.message, issue.remedy
     if count > 1:
         others = ", ".join(map(str, lines[1:]))
-        rest = ", …" if count > len(lines) else ""
+        more = ", …" if count > len(lines) else ""
         lines_word = "line" if count == 2 else "lines"
-        message += f"; so do {count - 1} more ({lines_word} {others}{rest})"
+        message += f"; so do {count - 1} more ({lines_word} {others}{more})"
     if state["misfits_other_centre"] == count:
         now, other, how = (
             ("G91.1", "G90.1", "absolute") if abs(row["c"]) == G91_1 else ("G90.1", "G91.1", "relative")

@@ -262,10 +262,10 @@ class Planner:
 
         By the controller's model; more than half a cycle counts.
         """
-        targets, joints, own = split(self.targets, self.joints, pieces, self.cell)
+        targets, joints, parts = split(self.targets, self.joints, pieces, self.cell)
         chain = krc4.build_chain(targets, self.cell)
         first, count = self.chain.first, len(self.chain.length_mm)
-        rows = own[first + 1 : first + 1 + count] - first - 1
+        rows = parts[first + 1 : first + 1 + count] - first - 1
         later_s = lasting(krc4.plan(chain, self.cell).move_end_s[rows] - self._move_end_s)
         slow = np.flatnonzero(later_s > _SAME_TIME * self.cell.controller.cycle_s)
         windows = windows_of(targets, chain, self.motion, self.cell)

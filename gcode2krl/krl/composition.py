@@ -281,12 +281,12 @@ class _Composer:
         """
         chunks: list[tuple[int, int, bool]] = []
         start, count = 0, len(self.targets)
-        apart = np.array(self.targets.ptp)
+        is_alone = np.array(self.targets.ptp)
         if self.rsi is not None:
-            apart[self.rsi.off] = True
-        borders = np.append(np.flatnonzero(apart), count)
+            is_alone[self.rsi.off] = True
+        borders = np.append(np.flatnonzero(is_alone), count)
         while start < count:
-            if apart[start]:
+            if is_alone[start]:
                 chunks.append((start, start + 1, False))
                 start += 1
                 continue

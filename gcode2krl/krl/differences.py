@@ -168,11 +168,11 @@ def _angles_deg(read: _Read, wanted: _Wanted, rows: Ints, cell: Cell) -> Floats:
     """Return the angles (r,) in deg between read and intended rotations; NaN where A, B or C is missing."""
     abc_deg, angle_deg = read.pose[rows, 3:6], np.empty(len(rows))
     for number in distinct(wanted.tool[rows]):
-        own = np.flatnonzero(wanted.tool[rows] == number)
+        of_tool = np.flatnonzero(wanted.tool[rows] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
-        found = fr.rotation_from_abc(np.nan_to_num(abc_deg[own]) * RAD_PER_DEG) @ turn
-        angle = fr.angle_between(fr.quaternion_from_rotation(found), wanted.rotation[rows[own]])
-        angle_deg[own] = angle * DEG_PER_RAD
+        rotation = fr.rotation_from_abc(np.nan_to_num(abc_deg[of_tool]) * RAD_PER_DEG) @ turn
+        angle = fr.angle_between(fr.quaternion_from_rotation(rotation), wanted.rotation[rows[of_tool]])
+        angle_deg[of_tool] = angle * DEG_PER_RAD
     angle_deg[np.isnan(abc_deg).any(axis=1)] = np.nan
     return angle_deg
 

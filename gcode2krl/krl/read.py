@@ -60,8 +60,8 @@ def motion_columns(
 
     def part(start: int, end: int) -> None:
         (settings, (motion, other)), (_, (last_motion, last_other)) = before[start], before[end]
-        rows, own = slice(start, end), slice(motion, last_motion)
-        columns = ptp[own], speed_mm_s[own], cdis_mm[own], motion_line[own]
+        rows, motions = slice(start, end), slice(motion, last_motion)
+        columns = ptp[motions], speed_mm_s[motions], cdis_mm[motions], motion_line[motions]
         _motions(kinds[rows], blends[rows], line[rows], number[other:last_other], settings, *columns)
 
     in_chunks(part, borders)
@@ -176,9 +176,9 @@ def read_krl(path: str | Path) -> KrlProgram:
     """
     main = Path(path)
     texts = {main.name: _text_in(main)}
-    beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
+    neighbours = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
     for name in _externals(texts[main.name]):
-        file = beside.get(name.upper())
+        file = neighbours.get(name.upper())
         if file is not None and file.name not in texts:
             texts[file.name] = _text_in(file)
     return read_texts(texts, main.name)
@@ -196,9 +196,9 @@ def _externals(text: bytes) -> Iterator[str]:
     upper = text.upper()
     at = upper.find(_EXT)
     while at >= 0:
-        found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
-        if found:
-            yield found[1].decode("ascii")
+        external = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
+        if external:
+            yield external[1].decode("ascii")
         line_end = upper.find(b"\n", at)
         at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
@@ -308,11 +308,11 @@ class _Reader:
         return kind
 
     def _triggers(self, executed: Executed) -> ReadTriggers:
-        own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
-        rows, values = executed.others[own], executed.value[own]
+        triggers = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
+        rows, values = executed.others[triggers], executed.value[triggers]
         file_of = executed.places(rows)[0]
         return ReadTriggers(
-            motion=rows - own,
+            motion=rows - triggers,
             distance=values[:, w.TRIGGER_DISTANCE],
             delay_ms=values[:, w.TRIGGER_DELAY],
             written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
@@ -330,15 +330,15 @@ class _Reader:
 
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
-        found: set[str] = set()
+        names: set[str] = set()
         for file in distinct(file_of).tolist():
             data = self.texts[self.names[file]]
             own = place[file_of == file]
             for size in distinct(own[:, 1]).tolist():
                 first = own[own[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
-                found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
-        return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
+                names |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
+        return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in names}))
 
     def _texts_of(self, block: StatementRun) -> tuple[str, ...]:
         rows = range(block.start, block.end)
@@ -374,11 +374,11 @@ class _Reader:
         name, start = "", 0
         for row in np.flatnonzero(scanned.kind == w.KIND_OTHER):
             text = self._statement(file, int(row))
-            found = _DEF.match(text)
-            if found:
+            match = _DEF.match(text)
+            if match:
                 if name:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} has no END", file)
-                name, start = found.group(1).upper(), int(row) + 1
+                name, start = match.group(1).upper(), int(row) + 1
                 self.def_lines.setdefault(name, int(scanned.line[row]))
             elif text.upper() == w.END:
                 if not name:

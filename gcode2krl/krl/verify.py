@@ -116,8 +116,8 @@ class VerifyReport:
     def words(self) -> str:
         """Return the outcome in words: ``457 motions, off by 0.0007 mm``."""
         off = f"off by {self.max_deviation_mm:.4f} mm, {self.max_rotation_deg:.4f} deg"
-        found = counted(self.issues)
-        return ", ".join([f"{self.motions} motions", off, *([found] if found else [])])
+        counts = counted(self.issues)
+        return ", ".join([f"{self.motions} motions", off, *([counts] if counts else [])])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints; what is not a number is null."""
@@ -331,15 +331,15 @@ def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: i
     """Return where HOME is another, axis by axis."""
     issues = []
     for row in np.flatnonzero(targets.home[:count] & program.ptp[:count]):
-        found, wanted = _joints_at(program, int(row)), joints.q_rad[row] * DEG_PER_RAD
-        wrong = np.flatnonzero(~(np.abs(found - wanted) <= JOINT_LIMIT_DEG))
+        stated_deg, wanted = _joints_at(program, int(row)), joints.q_rad[row] * DEG_PER_RAD
+        wrong = np.flatnonzero(~(np.abs(stated_deg - wanted) <= JOINT_LIMIT_DEG))
         if not len(wrong):
             continue
-        if np.isnan(found).all():
+        if np.isnan(stated_deg).all():
             text = "HOME is not given by its joints, A1 to A6"
         else:
             text = "HOME: " + ", ".join(
-                f"A{k + 1} is {'missing' if np.isnan(found[k]) else f'{found[k]:.4f}'}, "
+                f"A{k + 1} is {'missing' if np.isnan(stated_deg[k]) else f'{stated_deg[k]:.4f}'}, "
                 f"intended {wanted[k]:.4f} deg"
                 for k in wrong
             )
@@ -398,12 +398,12 @@ def _statement_issues(
     read: tuple[Statement, ...], intended: tuple[Statement, ...], program: KrlProgram
 ) -> list[Issue]:
     """Compare what stands between the motions: settings, guard, outputs, waits, calls, declarations."""
-    found = [(s.motion, _normal(s.text)) for s in read]
+    statements = [(s.motion, _normal(s.text)) for s in read]
     wanted = [(s.motion, _normal(s.text)) for s in intended]
-    if found == wanted:
+    if statements == wanted:
         return []
-    shorter = min(len(found), len(wanted))
-    at = next((k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b), shorter)
+    shorter = min(len(statements), len(wanted))
+    at = next((k for k, (a, b) in enumerate(zip(statements, wanted, strict=False)) if a != b), shorter)
     here = read[min(at, len(read) - 1)] if read else Statement(0, "", program.file[0], 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
@@ -417,12 +417,12 @@ def _statement_issues(
 
 def _uncalled_issues(program: KrlProgram, intended: KrlProgram) -> list[Issue]:
     """Compare the subprograms that triggers call, whatever file they stand in."""
-    found, wanted = (
+    read_tool, wanted = (
         {(key.split("/")[-1], texts) for key, texts in p.uncalled.items()} for p in (program, intended)
     )
     return [
         Issue("error", "verify-statement", program.def_line, f"subprogram {name} is not as intended", REMEDY)
-        for name, _ in sorted(found ^ wanted)
+        for name, _ in sorted(read_tool ^ wanted)
     ]
 
 

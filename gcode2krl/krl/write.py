@@ -68,8 +68,8 @@ class WrittenProgram:
         return Findings(self.issues)
 
     def __repr__(self) -> str:
-        found = counted(self.issues)
-        facts = [f"{len(self.files)} files", self.report.words(), *([found] if found else [])]
+        counts = counted(self.issues)
+        facts = [f"{len(self.files)} files", self.report.words(), *([counts] if counts else [])]
         return f"WrittenProgram({self.name}: {', '.join(facts)})"
 
     def _repr_html_(self) -> str:
@@ -344,8 +344,8 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
 
 
 def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell, split: str) -> list[Issue]:
-    beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
-    program = (text for name, text in texts.items() if not name.endswith(beside))
+    suffixes = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
+    program = (text for name, text in texts.items() if not name.endswith(suffixes))
     size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:

@@ -55,18 +55,18 @@ def gain_of(
     excess = after - before
     rms_before, rms_after = _rms(before), _rms(after)
     worse = excess > MATTERS_MM
-    found = [
+    findings = [
         _worse_line(int(number), excess, worse & (line == number), cycle_s)
         for number in np.unique(line[worse])
     ]
-    found.sort(key=lambda each: -each.excess_mm)
+    findings.sort(key=lambda each: -each.excess_mm)
     return Gain(
         rms_mm=rms_after,
         rms_less_percent=100.0 * (1.0 - rms_after / rms_before) if rms_before else None,
         better_share=float((excess < -MATTERS_MM).mean()),
         worse_share=float(worse.mean()),
         worst_line=int(line[np.argmax(after)]),
-        worse=tuple(found[:_MOST_LINES]),
+        worse=tuple(findings[:_MOST_LINES]),
     )
 
 

@@ -211,8 +211,8 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
         return replace(session, cycles=0)
     if session.cycles < probe.settle_cycles:
         return session
-    beside = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
-    if beside > probe.rest_mm:
+    off_mm = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
+    if off_mm > probe.rest_mm:
         return _enter(session, Phase.RESTING, "moved", rest_mm=telegram.position_mm)
     if not session.seen:
         return _enter(session, Phase.RESTING, "probe-not-seen", rest_mm=telegram.position_mm)

@@ -143,7 +143,7 @@ def simulate(twin: Twin, case: Case) -> TwinRun:
     time_s = twin.motion.time_s / twin.world.feed_scale
     force, moment = _late(twin, time_s)
     device = None if case == "uncompensated" else _device(twin, case)
-    told = _announced(twin, time_s)
+    announced = _announced(twin, time_s)
     noise = np.random.default_rng(twin.world.seed).normal(0.0, twin.world.noise_N, (len(time_s), 3))
     shift = np.zeros((len(time_s), 3))
     corrections: Corrections | None = None
@@ -158,7 +158,7 @@ def simulate(twin: Twin, case: Case) -> TwinRun:
         if before is not None and np.abs(tip - before).max(initial=0.0) < SETTLED_MM:
             break
         if device is not None:
-            _, corrections = stream(device, start(device), _samples(twin, time_s, load, present, told))
+            _, corrections = stream(device, start(device), _samples(twin, time_s, load, present, announced))
             shift = _shift(twin, corrections.correction, time_s)
     else:
         raise AssertionError(f"the loop did not settle within {MOST_ROUNDS} rounds")

@@ -111,8 +111,8 @@ def _cell_of(record: PredictionRecord, file: Path) -> Cell:
     try:
         return cell_from_resolved(record.cell, source=str(file))
     except NotUnderstoodError as error:
-        first, *rest = error.issues
-        more = f" (and {len(rest)} more)" if rest else ""
+        first, *others = error.issues
+        more = f" (and {len(others)} more)" if others else ""
         message = f"cell: {first.message}{more}"
         raise NotUnderstoodError(Issue("error", first.code, 0, message, REMEDY), str(file)) from None
 
@@ -155,8 +155,8 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
     for table in parts.values():
         if isinstance(table, Table):
             check_numbers(table)
-    beside = (parts.get("motion"), parts.get("forces"))
-    check_references(toolpath, targets, *beside, set(cell.tool), parts.get("clearance"))
+    tables = (parts.get("motion"), parts.get("forces"))
+    check_references(toolpath, targets, *tables, set(cell.tool), parts.get("clearance"))
     return parts
 
 

@@ -107,18 +107,18 @@ def _blends(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None, feed: Bo
         g64_line = line_with(toolpath.source, r"G64.*P", 1, line, from_end=True)
         remedy = "G64 P0.05 is usual; under G20 P counts inches"
         yield _wide_blend(f"G64 P allows corners to be {value:g} mm off", g64_line or line, remedy)
-    rest = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
-    if not rest.any():
+    blended = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
+    if not blended.any():
         return
     tolerance = tolerance_mm if tolerance_mm is not None else controller.tolerance_mm
     if tolerance is not None:
         if tolerance > WIDE_CORNER_MM:
             name = "--tolerance" if tolerance_mm is not None else "[controller] tolerance_mm ="
-            line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, rest)[0]])
+            line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, blended)[0]])
             words = f"{name} {tolerance:g} allows corners to be as many mm off"
             yield _wide_blend(words, line, "0.02 to 0.2 is usual")
     elif controller.cdis_mm * math.sqrt(0.125) > WIDE_CORNER_MM:
-        row, error_mm = _widest_corner(toolpath, controller.cdis_mm, rest)
+        row, error_mm = _widest_corner(toolpath, controller.cdis_mm, blended)
         words = f"[controller] cdis_mm = {controller.cdis_mm:g} rounds corners, this one by {error_mm:.3f} mm"
         yield _wide_blend(words, int(toolpath.source_line[row]), "0.05 to 1 is usual for milling")
 

@@ -210,17 +210,17 @@ def draw_passes(
 ) -> list[Axes]:
     """Draw each pass from above in a small map, all to one scale, with its words over it."""
     points = position_mm[:, :2]
-    inside = np.any([each.rows for each in passes], axis=0)
+    inside = np.any([drawn.rows for drawn in passes], axis=0)
     canvas = Canvas.around(points[inside], _ACROSS_SMALL if len(passes) > 1 else _ACROSS)
     cells = room.subgridspec(-(-len(passes) // _BESIDE), min(len(passes), _BESIDE))
     flat = canvas.shape[0] < 0.2 * canvas.shape[1]
     panels: list[Axes] = []
-    for place, each in enumerate(passes):
+    for place, drawn in enumerate(passes):
         axes = figure.add_subplot(cells[divmod(place, _BESIDE)])
-        image = shading.image(canvas, points, each.rows)
+        image = shading.image(canvas, points, drawn.rows)
         _show(axes, image, canvas, cmap=shading.colours, norm=shading.norm)
         axes.set_aspect("equal")
-        axes.set_title(each.name, loc="left", fontsize=8.5)
+        axes.set_title(drawn.name, loc="left", fontsize=8.5)
         axes.set_title(words[place], loc="right", fontsize=8)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.yaxis.set_major_locator(MaxNLocator(2 if flat else 4))

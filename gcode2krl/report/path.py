@@ -146,13 +146,13 @@ def _of_lines(scene: _Scene) -> Figure:
     motion, corner = scene.motion, scene.corner
     programmed = _programmed_mm(scene.targets, motion)
     across_mm = float(np.ptp(motion.position_mm, axis=0).max())
-    told = corners_apart(motion.path_mm, motion.corner, motion.move, _TOLD * across_mm)
+    marked = corners_apart(motion.path_mm, motion.corner, motion.move, _TOLD * across_mm)
     side, stretch = side_columns(np.concatenate([programmed, motion.position_mm]))
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.75, 1.0), height_ratios=(2.2, 1.0))
     views = _views(figure, grid, side, stretch, corner)
     for axes, columns in views:
-        _draw_path(axes, programmed[:, columns], motion.position_mm[:, columns], scene.rapid, told)
+        _draw_path(axes, programmed[:, columns], motion.position_mm[:, columns], scene.rapid, marked)
         axes.set_xlabel(f"{'XYZ'[columns[0]]} (mm)")
         axes.set_ylabel(f"{'XYZ'[columns[1]]} (mm)")
     views[0][0].set_title("From above", loc="left")

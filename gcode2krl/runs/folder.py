@@ -339,8 +339,10 @@ class Run:
     def __repr__(self) -> str:
         parts = [f"{name} {len(table)} rows" for name, table in self._tables().items()]
         parts += ["scan"] if self.scan is not None else []
-        found = counted(self.issues)
-        return f"Run({self.name[-60:]}: {', '.join([*(parts or ['no table']), *([found] if found else [])])})"
+        counts = counted(self.issues)
+        return (
+            f"Run({self.name[-60:]}: {', '.join([*(parts or ['no table']), *([counts] if counts else [])])})"
+        )
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the tables with their signals, and the findings."""

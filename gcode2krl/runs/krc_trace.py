@@ -243,11 +243,9 @@ def _six(module: _Module, pattern: str) -> Floats:
 def modules_of(file: Path) -> list[Path]:
     """Return the data sets of one recording, in order of their names."""
     stem = recording_of(file)
-    beside = sorted(file.parent.glob("*.dat"))
+    files = sorted(file.parent.glob("*.dat"))
     return [
-        module_file
-        for module_file in beside
-        if recording_of(module_file) == stem and is_data_set(module_file)
+        module_file for module_file in files if recording_of(module_file) == stem and is_data_set(module_file)
     ] or [file]
 
 

@@ -142,7 +142,7 @@ def _keys(parts: Sequence[PartResult], changes: dict[str, "_Changed"]) -> dict[s
 def _row(part: PartResult, change: "_Changed | None") -> Row:
     shown = part.reasons() or part.of_severity("warning")
     told = [(file, finding) for file, one in told_of(shown) for finding in one.findings][:_MOST_FINDINGS]
-    rest = len(part.of_severity("error", "warning")) - sum(len(finding.issues) for _, finding in told)
+    hidden = len(part.of_severity("error", "warning")) - sum(len(finding.issues) for _, finding in told)
     return Row(
         name=printable(part.name),
         verdict=part.verdict,
@@ -161,7 +161,7 @@ def _row(part: PartResult, change: "_Changed | None") -> Row:
             )
             for file, finding in told
         ),
-        others=f"and {rest:,} more" if rest > 0 else "",
+        others=f"and {hidden:,} more" if hidden > 0 else "",
     )
 
 

@@ -21,12 +21,12 @@ def junit_xml(records: Iterable[Record]) -> bytes:
     root = ElementTree.Element("testsuites", {"name": "gcode2krl", **_totals(parts)})
     folders = sorted({part.folder for part in parts})
     for folder in folders:
-        own = [part for part in parts if part.folder == folder]
-        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(folder), **_totals(own)})
-        if warning := demonstration(own):
+        in_folder = [part for part in parts if part.folder == folder]
+        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(folder), **_totals(in_folder)})
+        if warning := demonstration(in_folder):
             properties = ElementTree.SubElement(suite, "properties")
             ElementTree.SubElement(properties, "property", name="cell", value=warning)
-        suite.extend(_case(part) for part in own)
+        suite.extend(_case(part) for part in in_folder)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -29,13 +29,13 @@ same as another."""
 def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     """Return the file; ``root`` is the absolute folder in which the run began."""
     parts = parts_of(records)
-    found = sorted(set(_results(parts, root)))
-    kept = found[:MOST_RESULTS]
+    results = sorted(set(_results(parts, root)))
+    kept = results[:MOST_RESULTS]
     codes = sorted({code for *_, code, _ in kept})
     run = {
         "tool": {"driver": _driver(codes)},
         "invocations": [
-            {"executionSuccessful": True} | _notified(demonstration(parts), len(found) - len(kept))
+            {"executionSuccessful": True} | _notified(demonstration(parts), len(results) - len(kept))
         ],
         "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
         "columnKind": "unicodeCodePoints",

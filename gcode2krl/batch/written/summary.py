@@ -37,8 +37,8 @@ def summary_md(records: Iterable[Record], before: Iterable[Record] | None = None
     lines = [f"# {headline(parts)}", ""]
     if warning := demonstration(parts):
         lines += [f"> **{markdown(warning)}**", ""]
-    told = [(fact, f" ({_name(fact.part)})" if fact.part else "") for fact in facts(parts)]
-    lines += [f"- {fact.name}: {fact.value}{where}" for fact, where in told]
+    notes = [(fact, f" ({_name(fact.part)})" if fact.part else "") for fact in facts(parts)]
+    lines += [f"- {fact.name}: {fact.value}{where}" for fact, where in notes]
     lines += _refused([part for part in parts if not part.is_written])
     if before is not None:
         lines += _changes(records, before)
@@ -70,9 +70,9 @@ def _first_finding(part: PartResult) -> tuple[str, str, str]:
 
 
 def _changes(records: Iterable[Record], before: Iterable[Record]) -> Iterator[str]:
-    found = difference(records, before)
-    yield from ("", "## Against the last run", "", difference_sentence(found))
-    rows = list(difference_rows(found))
+    changes = difference(records, before)
+    yield from ("", "## Against the last run", "", difference_sentence(changes))
+    rows = list(difference_rows(changes))
     if rows:
         yield ""
         yield from _head("part", "", "time", "largest force", "largest deflection")

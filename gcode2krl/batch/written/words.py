@@ -78,13 +78,13 @@ def facts(parts: Sequence[PartResult]) -> list[Fact]:
     written = [part for part in parts if part.is_written]
     cached = sum(part.cached for part in parts)
     warnings = sum(part.count("warning") for part in parts)
-    found = [Fact("machining time", duration(sum(part.time_s or 0.0 for part in written)))] if written else []
-    found += _largest("largest force", written, lambda part: part.force_N, force)
-    found += _largest("largest deflection", written, lambda part: part.deflection_mm, deflection)
-    found.append(Fact("computed in", duration(sum(part.seconds or 0.0 for part in parts))))
-    found += [Fact("from the cache", _counted(cached, "part"))] if cached else []
-    found += [Fact("warnings", f"{warnings:,}")] if warnings else []
-    return found
+    facts = [Fact("machining time", duration(sum(part.time_s or 0.0 for part in written)))] if written else []
+    facts += _largest("largest force", written, lambda part: part.force_N, force)
+    facts += _largest("largest deflection", written, lambda part: part.deflection_mm, deflection)
+    facts.append(Fact("computed in", duration(sum(part.seconds or 0.0 for part in parts))))
+    facts += [Fact("from the cache", _counted(cached, "part"))] if cached else []
+    facts += [Fact("warnings", f"{warnings:,}")] if warnings else []
+    return facts
 
 
 def _largest(
@@ -148,8 +148,8 @@ def share(before: float | None, after: float | None) -> str:
 def _from_to(before: float | None, after: float | None, words: Callable[[float | None], str]) -> str:
     """Return two figures and the change in percent, one figure where they read the same."""
     percent = share(before, after)
-    told = words(after) if words(before) == words(after) else f"{words(before)} → {words(after)}"
-    return f"{told} ({percent})" if percent else told
+    shown = words(after) if words(before) == words(after) else f"{words(before)} → {words(after)}"
+    return f"{shown} ({percent})" if percent else shown
 
 
 def _counted(count: int, noun: str) -> str:

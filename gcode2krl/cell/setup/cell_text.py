@@ -323,9 +323,9 @@ def _line(section: Any, name: str, value: Any) -> Iterator[str]:
 
 def _commented(stated: str, comment: str) -> Iterator[str]:
     """Yield a line with its comment behind it, or above it where that would be too long."""
-    beside = f"{stated:<{_COMMENT_COLUMN}}# {comment}"
-    if len(beside) <= _LONGEST_LINE and len(stated) < _COMMENT_COLUMN:
-        yield beside
+    line = f"{stated:<{_COMMENT_COLUMN}}# {comment}"
+    if len(line) <= _LONGEST_LINE and len(stated) < _COMMENT_COLUMN:
+        yield line
     else:
         yield from textwrap.wrap(comment, _LONGEST_LINE, initial_indent="# ", subsequent_indent="# ")
         yield stated

@@ -57,8 +57,8 @@ def read_archive(path: Path) -> dict[str, DataList]:
         entries = _of_folder(path) if path.is_dir() else _of_zip(path)
     except OSError as error:
         raise _refused(path, f"cannot read: {error.strerror or error}", "name a folder or a zip") from None
-    found = {name: _only_one(name, entries, path) for name in WANTED}
-    lists = {name: one for name, one in found.items() if one is not None}
+    data_lists = {name: _only_one(name, entries, path) for name in WANTED}
+    lists = {name: one for name, one in data_lists.items() if one is not None}
     if not lists:
         sentence = f"no {' and no '.join(WANTED)} in it"
         raise _refused(path, sentence, "archive with File > Archive > USB (KUKA) > All, and name that zip")

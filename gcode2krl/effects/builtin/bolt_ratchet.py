@@ -122,8 +122,8 @@ class JointRatchet(_Ratchet):
         """Return a typical step at the middle of the torques of the run."""
         torque_Nm = np.abs(inputs.own_torque_Nm[:, JOINTS.index(target or "")])
         middle_Nm = (torque_Nm.max(initial=0.0) + torque_Nm.min(initial=np.inf)) / 2.0
-        own = super().start(inputs, target)
-        return own | {"threshold_Nm": float(middle_Nm)} if 0.0 < middle_Nm < np.inf else own
+        start = super().start(inputs, target)
+        return start | {"threshold_Nm": float(middle_Nm)} if 0.0 < middle_Nm < np.inf else start
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gear."""

@@ -61,8 +61,8 @@ class CurrentLimit(Effect):
 
     def start(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return a limit a fifth below that."""
-        own = self.nominal(inputs, target)
-        return own | {"limit_deg_s2": _SMALLER * own["limit_deg_s2"]}
+        nominal = self.nominal(inputs, target)
+        return nominal | {"limit_deg_s2": _SMALLER * nominal["limit_deg_s2"]}
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""

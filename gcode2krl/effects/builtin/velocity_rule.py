@@ -60,9 +60,9 @@ class VelocityRule(Effect):
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs of the motion with these constants."""
-        own = self.nominal(inputs)
-        used = {name: own[name] if math.isnan(applied[name]) else applied[name] for name in own}
-        if used == own or inputs.targets is None:
+        nominal = self.nominal(inputs)
+        used = {name: nominal[name] if math.isnan(applied[name]) else applied[name] for name in nominal}
+        if used == nominal or inputs.targets is None:
             return inputs
         controller = inputs.cell.controller.model_copy(update=used)
         return inputs.replanned(inputs.targets, inputs.cell.model_copy(update={"controller": controller}))

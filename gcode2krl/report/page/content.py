@@ -107,9 +107,9 @@ def _clustered(triangles_mm: Floats, cells: float) -> Floats:
     side_mm = max(float(np.ptp(corners, axis=0).max()), 1e-9) / cells
     place = np.floor((corners - low) / side_mm).astype(np.int64)
     number = (place[:, 0] * (_FINEST + 1) + place[:, 1]) * (_FINEST + 1) + place[:, 2]
-    _, own, count = np.unique(number, return_inverse=True, return_counts=True)
-    middle = np.stack([np.bincount(own, corners[:, k]) / count for k in range(3)], axis=1)
-    faces = own.reshape(-1, 3)
+    _, cell, count = np.unique(number, return_inverse=True, return_counts=True)
+    middle = np.stack([np.bincount(cell, corners[:, k]) / count for k in range(3)], axis=1)
+    faces = cell.reshape(-1, 3)
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
@@ -202,14 +202,25 @@ def content_of(
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
         ``triangles_mm`` (t, 3, 3). None where nobody compared.
     """
-    found = tuple(prediction.issues if issues is None else issues)
+    listed = tuple(prediction.issues if issues is None else issues)
     whole = samples_of(prediction)
     if whole is None or len(whole) == 0:
         return content_of_refused(
-            found, title=_name(prediction.toolpath), verdict=verdict, toolpath=prediction.toolpath, text=text
+            listed,
+            title=_name(prediction.toolpath),
+            verdict=verdict,
+            toolpath=prediction.toolpath,
+            text=text,
         )
     made = _content(
-        _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
+        _name(prediction.toolpath),
+        verdict,
+        whole,
+        listed,
+        prediction.cell,
+        text,
+        stock_mm,
+        _facts(prediction),
     )
     made = _with_meshes(_with_tool_axes(made, prediction.toolpath), meshes_mm or {})
     return made if nominal is None else _with_nominal(made, nominal, whole)
@@ -226,20 +237,20 @@ def content_of_refused(
     stock_mm: Floats | None = None,
 ) -> Content:
     """Return the page of a program of which no motion is known: findings, text, and the programmed path."""
-    found = tuple(issues)
+    listed = tuple(issues)
     rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M if cell is not None else None
     whole = samples_of_path(toolpath, rapid_mm_s) if toolpath is not None else None
     if toolpath is not None and whole is not None and len(whole) > 1:
-        made = _content(title, verdict, whole, found, cell, text, stock_mm, [])
+        made = _content(title, verdict, whole, listed, cell, text, stock_mm, [])
         return _with_tool_axes(made, toolpath)
-    shown = told(found)
+    shown = told(listed)
     return Content(
         title=title,
         verdict=verdict,
         sentence=_refusal(shown, verdict),
         told=shown,
         not_checked=["Everything after the reading of the program: path, time, forces, deflection."],
-        head=_head_without_path(found, text),
+        head=_head_without_path(listed, text),
         text=packed_text(text or ""),
     )
 
@@ -322,7 +333,7 @@ def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:
 def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples) -> Content:
     """Return a page with the differences to the nominal part, as a table and as solids."""
     rows = thinned(whole)
-    found = [
+    deviations = [
         Deviation(
             **{key: one[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
             row=_nearest(rows, one["row"]),
@@ -335,9 +346,9 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples)
     points = np.concatenate(corners) if corners else np.empty((0, 3))
     solids, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
     head = content.head | {
-        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in found]},
+        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in deviations]},
     }
-    compared = Compared(found, sum(nominal["left_out"].values()), nominal["volume_mm3"])
+    compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"])
     return replace(content, head=head, solids=solids, compared=compared)
 
 
@@ -404,8 +415,8 @@ def _worst(quantity: Quantity, whole: PageSamples, rows: Ints) -> Worst:
     if not quantity.is_margin:
         considered = np.where(considered > 0.0, considered, np.nan)
     places = worst_places(considered, whole.time_s, whole.line)
-    own = [NotableSample(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
-    return Worst(quantity.label, quantity.unit, own)
+    samples = [NotableSample(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
+    return Worst(quantity.label, quantity.unit, samples)
 
 
 def _nearest(rows: Ints, row: int) -> int:
@@ -488,9 +499,9 @@ def duration(seconds: float) -> str:
     """Return a time as a person reads it."""
     if seconds < S_PER_MIN:
         return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), int(S_PER_MIN))
+    minutes, seconds_left = divmod(round(seconds), int(S_PER_MIN))
     hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds_left} s"
 
 
 def _name(toolpath: Toolpath) -> str:
