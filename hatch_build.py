@@ -6,13 +6,18 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+IMPORTED = ("numpy", "pydantic", "jinja2")
+
 
 class CompiledCore(BuildHookInterface):
     """Compile native/ into the package, for wheels and for editable installations."""
 
     def dependencies(self) -> list[str]:
-        """Return what the build needs besides the backend: a compiler, if the machine has none."""
-        return [] if self._native().compiler() else ["ziglang>=0.13"]
+        """Return what the build needs besides the backend: a compiler, if the machine has none, and what is
+        imported by the modules of whose constants a C header is made.
+        """
+        imported = [each for each in self.metadata.core.dependencies if each.startswith(IMPORTED)]
+        return imported if self._native().compiler() else [*imported, "ziglang>=0.13"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, and name the wheel after the platform: it holds no code for a particular Python."""

@@ -20,7 +20,7 @@ from gcode2krl import krc4, program
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.gcode import read_gcode, read_stream
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import TextLayout, compose
 from gcode2krl.krl.original_path import compare_with_original
 from gcode2krl.krl.read import read_texts
 from gcode2krl.pipeline import set_targets
@@ -127,7 +127,7 @@ def _cost(moves: int, cell: Cell) -> None:
     fewer = timed("merging", lambda: program.merged(whole, toolpath, cell, 0.01))
     for name, targets in (("time before", whole), ("time after", fewer)):
         timed(name, lambda t=targets: krc4.plan(krc4.build_chain(t, cell), cell))
-    files = compose(fewer, ptp_joints(fewer, cell), cell, "RASTER", Layout())
+    files = compose(fewer, ptp_joints(fewer, cell), cell, "RASTER", TextLayout())
     texts = {name: b"".join(pieces) for name, pieces in files.items()}
     read = read_texts(texts, "RASTER.src")
     timed("against the G-code", lambda: compare_with_original(read, fewer, toolpath, cell))

@@ -66,7 +66,7 @@ def reaction_s(changed):
     """Return how long a force step takes to show to 90 % in the robot's movement."""
     import numpy as np
 
-    from gcode2krl.online.filters import filter_start, filtered
+    from gcode2krl.online.compensator import filter_start, filtered
     from gcode2krl.online.plant import reaction
 
     settings = Online(**{key: value for key, value in changed.items() if key in Online.model_fields})

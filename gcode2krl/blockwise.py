@@ -187,9 +187,9 @@ class _Guard:
         if elsewhere.any():
             q_rad = np.where(elsewhere[:, None], np.nan, q_rad)
         if len(q_rad):
-            told = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move], external)
+            watched = self.watch.samples(q_rad, np.ascontiguousarray(tool), self._line[move], external)
             if self._kept is not None:
-                self._kept.append(told)
+                self._kept.append(watched)
 
     def clearance(self) -> Clearance:
         """Return the clearances of all samples."""
@@ -317,8 +317,8 @@ class Loads:
             q_rad, qd_rad_s = np.concatenate([q_old, q_rad]), np.concatenate([qd_old, qd_rad_s])
         count = len(forces)
         self.count += count
-        rest = rows_of(motion, count, len(motion))
-        self._waiting = (rest, q_rad[count:].copy(), qd_rad_s[count:].copy())
+        tail = rows_of(motion, count, len(motion))
+        self._waiting = (tail, q_rad[count:].copy(), qd_rad_s[count:].copy())
         return self._judged(rows_of(motion, 0, count), q_rad[:count], qd_rad_s[:count], forces)
 
     def _judged(self, motion: Motion, q_rad: Floats, qd_rad_s: Floats, forces: Forces) -> Block:
@@ -337,16 +337,16 @@ class Loads:
         """Return what was found, once the motion has ended."""
         if self._milling is None:
             return Outcome(None, None, self._skipped)
-        found = self._milling.issues()
+        issues = self._milling.issues()
         if self._arm is not None:
             self._arm.finish()
-            found = (*found, *self._arm.issues())
+            issues = (*issues, *self._arm.issues())
         limits, bent = self._force_limits, self._deflection_limit
         if limits.absurd is not None:
-            return Outcome(None, None, (*found, limits.absurd))
-        guessed = any(issue.code == "stock-guessed" for issue in found)
+            return Outcome(None, None, (*issues, limits.absurd))
+        guessed = any(issue.code == "stock-guessed" for issue in issues)
         feeds = program.feeds_per_tooth(self._toolpath, self._cell, self._cuts)
-        force_issues = (*found, *limits.issues(guessed), *feeds)
+        force_issues = (*issues, *limits.issues(guessed), *feeds)
         if self._missing is not None:
             return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
         if bent.absurd is not None:

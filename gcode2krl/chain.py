@@ -1,8 +1,9 @@
 """The one chain from a Toolpath to what a program and a prediction are made of.
 
-`prepare` makes a `Plan`: what the robot will be told, and all that is known before it moves. A `Run` is the
-motion of a plan, whose samples pass joints, cutting and compliance in blocks. `collect` keeps every sample
-and returns a Prediction; `foresee` keeps what a program and its summary need: a Forecast.
+`prepare` makes a `Plan`: what the robot will be told, and all that is known before it moves. A
+`PlannedMotion` is the motion of a plan, whose samples pass joints, cutting and compliance in blocks.
+`collect` keeps every sample and returns a Prediction; `foresee` keeps what a program and its summary need:
+a Forecast.
 """
 
 import hashlib
@@ -54,9 +55,9 @@ class Plan:
     @classmethod
     def of(cls, toolpath: Toolpath, targets: Targets, cell: Cell) -> "Plan":
         """Return the plan of targets as they are, nothing added to their findings."""
-        joints, found = robot.follow(targets, cell, conditioning=False)
+        joints, issues = robot.follow(targets, cell, conditioning=False)
         ways = tuple(ways_beside(targets, joints.q_rad, cell))
-        return cls(toolpath, cell, targets, replace(joints, issues=found), ways)
+        return cls(toolpath, cell, targets, replace(joints, issues=issues), ways)
 
     def judged(self) -> "Plan":
         """Return the plan whose targets have the findings on reach, limits, singularities and table too.
@@ -133,7 +134,7 @@ def corner_errors(
     return error_mm, findings
 
 
-class Run:
+class PlannedMotion:
     """The motion of a plan, planned; its samples then pass cutting and compliance in blocks."""
 
     def __init__(self, plan: Plan, dt_s: float, *, keeps: bool) -> None:
@@ -173,7 +174,7 @@ def collect(
     cell, targets = plan.cell, plan.targets
     dt_s = cell.controller.cycle_s if dt_s is None else dt_s
     begin("motion")
-    run = Run(plan, dt_s, keeps=True)
+    run = PlannedMotion(plan, dt_s, keeps=True)
     begin("joints")
     kept = run.motion.samples()
     motion, joints = kept.motion, kept.joints(cell)
@@ -214,7 +215,7 @@ def _inputs(plan: Plan, dt_s: float, settings: dict[str, Any]) -> dict[str, Any]
 def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Forecast:
     """Return what a program needs of a plan's prediction at the controller's cycle; no sample is kept."""
     begin("motion and joints")
-    run = Run(plan, plan.cell.controller.cycle_s, keeps=False)
+    run = PlannedMotion(plan, plan.cell.controller.cycle_s, keeps=False)
     course, figures = run.motion.course, LargestLoads()
     samples = PilotSamples(plan.cell, course.count)
     if forces:
@@ -225,13 +226,13 @@ def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Foreca
                 samples.take(block.motion, block.line, block.forces, block.deflection)
     outcome = run.outcome
     known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
-    found = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
+    groups = (outcome.force_issues or (), outcome.deflection_issues or (), outcome.skipped)
     last = course.at(np.array([course.count - 1]))
     return Forecast(
         toolpath=plan.toolpath,
         targets=plan.targets,
         cell=plan.cell,
-        issues=(*plan.targets.issues, *run.motion.issues, *itertools.chain.from_iterable(found)),
+        issues=(*plan.targets.issues, *run.motion.issues, *itertools.chain.from_iterable(groups)),
         time_s=float(last.time_s[0]),
         path_mm=float(last.path_mm[0]),
         loads=figures.figures(with_deflection=bends) if known else None,

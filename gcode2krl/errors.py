@@ -67,8 +67,8 @@ class Issue:
         entry = None if self.remedy else all_codes().get(self.code)
         if entry is None:
             return self.remedy
-        first, _, rest = entry.remedy.rstrip(".").partition(" ")
-        return f"{first.lower() if first[1:].islower() else first} {rest}"
+        first, _, others = entry.remedy.rstrip(".").partition(" ")
+        return f"{first.lower() if first[1:].islower() else first} {others}"
 
     def text(self, source: str = "", also: str = "") -> str:
         """Return the finding on one line, ``part.nc:120: error: … [code] -> remedy``.
@@ -95,7 +95,7 @@ def _shortened(text: str, most: int) -> str:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Finding:
+class EqualIssues:
     """Equal findings, or findings that differ only in their figures, printed on one line."""
 
     issues: tuple[Issue, ...]
@@ -132,7 +132,7 @@ class Finding:
 class Told:
     """What is printed of many findings: errors first, each cause once, at most `MOST_LINES`."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[EqualIssues, ...]
     left_out: tuple[Issue, ...]
     """Findings that did not fit."""
     consequences: tuple[Issue, ...]
@@ -156,7 +156,7 @@ def told(issues: Iterable[Issue]) -> Told:
     """Return what to print of findings: equal ones as one, consequences counted only."""
     ordered = sorted(issues, key=lambda issue: _RANK[issue.severity])
     causes, consequences = _split_consequences(ordered)
-    findings: list[Finding] = []
+    findings: list[EqualIssues] = []
     left_out: list[Issue] = []
     of_code: Counter[str] = Counter()
     for finding in _joined(causes):
@@ -187,7 +187,7 @@ def _split_consequences(issues: Sequence[Issue]) -> tuple[list[Issue], list[Issu
     return [issue for issue in issues if id(issue) not in following], consequences
 
 
-def _joined(issues: Sequence[Issue]) -> list[Finding]:
+def _joined(issues: Sequence[Issue]) -> list[EqualIssues]:
     """Join equal findings; if a code has many messages, also those that differ only in their figures."""
     equal = _grouped(issues, lambda issue: (issue.severity, issue.code, issue.message, issue.remedy))
     sentences = Counter(group[0].code for group in equal)
@@ -198,7 +198,7 @@ def _joined(issues: Sequence[Issue]) -> list[Finding]:
             return issue.severity, issue.code, issue.message, issue.remedy
         return issue.severity, issue.code, _FIGURE.sub("", issue.message), _FIGURE.sub("", issue.remedy)
 
-    return [Finding(group) for group in _grouped(issues, without_figures)]
+    return [EqualIssues(group) for group in _grouped(issues, without_figures)]
 
 
 def _grouped(issues: Iterable[Issue], key: Callable[[Issue], Hashable]) -> list[tuple[Issue, ...]]:

@@ -1,6 +1,7 @@
 """Compile the core: every C file under native/ into libraries in gcode2krl/compiled/built.
 
-Run by the build backend for an installation, and by hand after an edit of a C file::
+Run by the build backend for an installation, and by hand after an edit of a C file or of a constant in a
+Python module, of which ``native/constants.py`` makes a header first::
 
     python native/build.py                                     # for this machine
     python native/build.py --checked                           # beside it one that checks every index
@@ -125,6 +126,7 @@ def build(
     if command is None:
         raise SystemExit("no C compiler: install one, or the package ziglang, which brings one")
     machine = machine or Machine.this()
+    _run([sys.executable, str(HERE / "constants.py")])
     into.mkdir(parents=True, exist_ok=True)
     return [
         _library(command, machine, flags, into / f"{name}{SUFFIXES[machine.system]}")

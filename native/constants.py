@@ -1,8 +1,7 @@
 """Write native/constants.h: what the Python modules and the core must agree about, from the Python modules.
 
-Run after a change of one of these modules; a test compares the file with what they say::
-
-    python native/constants.py
+`native/build.py` runs it before it compiles; the file is not kept. Needs numpy, pydantic and jinja2, as the
+modules do.
 
 A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of numbers
 what an array begins with, an enumeration of whole numbers ``PREFIX_NAME_MEMBER``, a record of numpy a C
@@ -11,17 +10,20 @@ struct with the same fields in the same places, and a `StructOf` the C struct th
 
 import enum
 import math
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from gcode2krl.compiled import core
-
 HEADER = Path(__file__).resolve().parent / "constants.h"
+sys.path.insert(0, str(HEADER.parents[1]))  # the modules beside this file, also where they are not installed
+
+from gcode2krl.compiled import core  # noqa: E402
+
 MODULES = {
     "CH": "gcode2krl.ascii_codes",
     "W": "gcode2krl.krl_words",
@@ -29,14 +31,8 @@ MODULES = {
     "V": "gcode2krl.gcode.vocabulary",
     "D": "gcode2krl.gcode.dialect_marks",
     "DR": "gcode2krl.gcode.dialects",
-    "F": "gcode2krl.gcode.findings",
-    "FC": "gcode2krl.gcode.cycle_findings",
-    "FP": "gcode2krl.gcode.polar_findings",
-    "FO": "gcode2krl.gcode.offset_findings",
-    "FM": "gcode2krl.gcode.mode_findings",
     "S": "gcode2krl.gcode.state",
     "P": "gcode2krl.gcode.program_tables",
-    "PF": "gcode2krl.gcode.program_faults",
     "N": "gcode2krl.gcode.parameter_names",
     "SW": "gcode2krl.cutting.sweep",
     "ED": "gcode2krl.cutting.edge",
@@ -48,11 +44,13 @@ MODULES = {
     "ADVANCE": "gcode2krl.collision.along",
     "FEED": "gcode2krl.online.feed",
     "LIMITS": "gcode2krl.online.limits",
-    "BLENDING": "gcode2krl.online.blending",
+    "BLENDING": "gcode2krl.online.compensator",
     "PILOT": "gcode2krl.online.pilot_gate",
     "DIFF": "gcode2krl.krl.differences",
 }
 """Prefix -> module whose numbers and words the core uses."""
+FINDINGS = "gcode2krl.gcode.findings"
+"""The module whose tables of numbers bear the prefixes themselves."""
 RECORDS = {
     "State": ("gcode2krl.gcode.state", "STATE"),
     "Modes": ("gcode2krl.gcode.state", "MODES"),
@@ -114,7 +112,11 @@ def header() -> str:
         "",
     ]
     for prefix, name in MODULES.items():
-        lines += [*_constants(prefix, import_module(name)), ""]
+        lines += [f"/* {name} */", *_constants(prefix, import_module(name)), ""]
+    findings = import_module(FINDINGS)
+    for prefix in (*findings.TABLES, findings.FAULTS):
+        lines += [f"/* {FINDINGS} */", *_constants(prefix, getattr(findings, prefix)), ""]
+    lines += [f"#define F_WARNINGS {_literal(findings.warnings())}", ""]
     for name, place in RECORDS.items():
         lines += [*_struct(name, _at(place)), f"VIEW({name}View, {name});", ""]
     for name, place in ARGUMENTS.items():
@@ -122,12 +124,11 @@ def header() -> str:
     return "\n".join([*lines, "#endif", ""])
 
 
-def _constants(prefix: str, module: ModuleType) -> Iterator[str]:
-    yield f"/* {module.__name__} */"
-    for name, value in vars(module).items():
+def _constants(prefix: str, names: ModuleType | SimpleNamespace) -> Iterator[str]:
+    for name, value in vars(names).items():
         if name.isupper() and not name.startswith("_") and (text := _literal(value)):
             yield f"#define {prefix}_{name} {text}"
-        elif isinstance(value, enum.EnumMeta) and value.__module__ == module.__name__:
+        elif isinstance(value, enum.EnumMeta) and value.__module__ == names.__name__:
             yield from (f"#define {prefix}_{name.upper()}_{each.name} {int(each)}" for each in value)
 
 

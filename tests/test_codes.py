@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gcode2krl.codes import all_codes, closest, follows
+from gcode2krl.gcode.findings import all_findings
 from gcode2krl.krl.release import NEVER_RELEASED, STRICTER_HERE
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -98,6 +99,7 @@ def _used() -> dict[str, str]:
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and KEBAB.fullmatch(node.value):
                 used[node.value] = file.name
+    used |= {finding.code: "findings.toml" for finding in all_findings().values()}
     return {word: file for word, file in used.items() if word not in NOT_CODES}
 
 
@@ -122,7 +124,9 @@ def test_every_code_of_the_source_is_in_the_table() -> None:
 
 
 def test_every_code_of_the_table_is_in_the_source() -> None:
-    source = "".join(file.read_text("utf-8") for file in (ROOT / "gcode2krl").rglob("*.py"))
+    package = ROOT / "gcode2krl"
+    files = [*package.rglob("*.py"), package / "gcode" / "findings.toml"]
+    source = "".join(file.read_text("utf-8") for file in files)
     literals = set(re.findall(r'"([a-z0-9-]+)"', source))
     assert [name for name in all_codes() if name not in literals] == []
 

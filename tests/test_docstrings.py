@@ -11,7 +11,7 @@ import pytest
 
 import gcode2krl
 from gcode2krl import load_cell, predict
-from gcode2krl.exchange import Columns, Findings, Frame, Table, column_units, disk_names
+from gcode2krl.exchange import ColumnFrame, Findings, Frame, Table, column_units, disk_names
 from gcode2krl.gap import Gap
 from gcode2krl.krl import VerifyReport, WrittenProgram
 from gcode2krl.prediction.plots import Plots
@@ -41,7 +41,7 @@ box_mm = [[0, -100, -30], [100, 100, 0]]
 NO_EXAMPLE = {"__version__"}
 """A text, which has no docstring of its own."""
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-FURTHER = (Frame, Table, Columns, Findings, Plots, Gap, VerifyReport, WrittenProgram)
+FURTHER = (Frame, Table, ColumnFrame, Findings, Plots, Gap, VerifyReport, WrittenProgram)
 """Classes that public functions return; their examples run, too."""
 
 

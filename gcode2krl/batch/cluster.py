@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gcode2krl.batch.crew import Answer
+from gcode2krl.batch.crew import TaskAnswer
 from gcode2krl.batch.planning import program_digest
 from gcode2krl.batch.work import Made, Task, make
 from gcode2krl.compiled.threads import THREADS_VARIABLE
@@ -126,7 +126,7 @@ class Cluster:
         tasks: Sequence[Task],
         costs_mb: Sequence[float],
         order: Sequence[int] | None = None,
-    ) -> Iterator[Answer]:
+    ) -> Iterator[TaskAnswer]:
         """Yield the answer of each task as it is finished.
 
         ``function`` is `make`, which `make_shipped` calls; ``costs_mb`` is left to the limits that the
@@ -141,13 +141,13 @@ class Cluster:
         waiting = iter(range(len(tasks)) if order is None else order)
         began: dict[Any, tuple[int, float]] = {}
 
-        def send(count: int) -> Iterator[Answer]:
+        def send(count: int) -> Iterator[TaskAnswer]:
             """Send so many tasks; yield the failure of those that cannot be sent."""
             for task in islice(waiting, count):
                 try:
                     future = client.submit(make_shipped, pack(tasks[task]), pure=False)
                 except (OSError, NotUnderstoodError) as error:
-                    yield Answer(task, None, str(error))
+                    yield TaskAnswer(task, None, str(error))
                     continue
                 began[future.key] = task, time.perf_counter()
                 finished.add(future)
@@ -157,7 +157,7 @@ class Cluster:
             for future in finished:
                 task, began_s = began.pop(future.key)
                 value, failure = _result(future)
-                yield Answer(task, value, failure, time.perf_counter() - began_s)
+                yield TaskAnswer(task, value, failure, time.perf_counter() - began_s)
                 yield from send(1)
 
     def _refuse_other_programs(self, client: "Client") -> None:

@@ -41,7 +41,7 @@ _EXIT_CODE = re.compile(r"\{(SIG\w+|\w+\((\d+)\))")
 
 
 @dataclass(frozen=True)
-class Answer:
+class TaskAnswer:
     """What became of a task: its value, or why there is none."""
 
     task: int
@@ -102,7 +102,7 @@ class Crew:
         costs_mb: Sequence[float],
         order: Sequence[int] | None = None,
         ahead: int | None = None,
-    ) -> Iterator[Answer]:
+    ) -> Iterator[TaskAnswer]:
         """Yield the answer of each task as it is finished.
 
         ``function`` and the tasks are sent to the workers. ``order`` says which is begun first. A task whose
@@ -112,7 +112,7 @@ class Crew:
         self._waiting = list(range(len(tasks))) if order is None else list(order)
         self._costs_mb = costs_mb
         self._before = len(tasks) if ahead is None else ahead
-        answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+        answers: queue.SimpleQueue[TaskAnswer] = queue.SimpleQueue()
         self._threads = [
             threading.Thread(target=self._work, args=(worker, function, tasks, answers), daemon=True)
             for worker in self._workers[: len(tasks)]
@@ -122,9 +122,9 @@ class Crew:
         finished = (_next(answers) for _ in tasks)
         yield from finished if ahead is None else self._in_turn(finished, ahead)
 
-    def _in_turn(self, finished: Iterator[Answer], ahead: int) -> Iterator[Answer]:
+    def _in_turn(self, finished: Iterator[TaskAnswer], ahead: int) -> Iterator[TaskAnswer]:
         """Yield answers in the order of their tasks."""
-        early: dict[int, Answer] = {}
+        early: dict[int, TaskAnswer] = {}
         turn = 0
         for answer in finished:
             early[answer.task] = answer
@@ -140,14 +140,14 @@ class Crew:
         worker: "_Worker",
         function: Callable[[Any], Any],
         tasks: Sequence[Any],
-        answers: "queue.SimpleQueue[Answer]",
+        answers: "queue.SimpleQueue[TaskAnswer]",
     ) -> None:
         """Let a worker carry out tasks until none is left."""
         while (task := self._take()) is not None:
             began_s = time.perf_counter()
             value, failure, again = worker.call(function, tasks[task])
             if not self._done(task, again):
-                answers.put(Answer(task, value, failure, time.perf_counter() - began_s))
+                answers.put(TaskAnswer(task, value, failure, time.perf_counter() - began_s))
 
     def _take(self) -> int | None:
         """Return the next task as soon as it may begin, None where nothing is left."""
@@ -236,7 +236,7 @@ class _Worker:
             pool.shutdown(kill_workers=True)
 
 
-def _next(answers: "queue.SimpleQueue[Answer]") -> Answer:
+def _next(answers: "queue.SimpleQueue[TaskAnswer]") -> TaskAnswer:
     while True:
         with contextlib.suppress(queue.Empty):
             return answers.get(timeout=_TICK_S)

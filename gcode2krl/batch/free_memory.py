@@ -22,8 +22,8 @@ _NO_LIMIT = 1 << 60
 
 def expected_mb(size_bytes: int, whole_tables: bool) -> float:
     """Return the peak memory (MB) that the translation of a program of this size is expected to need."""
-    each = WHOLE_TABLES_PER_MB if whole_tables else PER_MB
-    return BASE_MB + each * size_bytes / _MEGABYTE
+    mb_per_megabyte = WHOLE_TABLES_PER_MB if whole_tables else PER_MB
+    return BASE_MB + mb_per_megabyte * size_bytes / _MEGABYTE
 
 
 def budget_mb() -> float:

@@ -16,7 +16,7 @@ _KEYS = ("path", "cell", "job")
 
 
 @dataclass(frozen=True)
-class Part:
+class BatchPart:
     """A part of a batch."""
 
     key: str
@@ -31,7 +31,7 @@ class Part:
         return self.key.rpartition("/")[0] + "/" if "/" in self.key else ""
 
 
-def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None = None) -> list[Part]:
+def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None = None) -> list[BatchPart]:
     """Return the parts that words name, sorted by their keys.
 
     A word is a folder (all files in it with an ending of programs, however deep), a pattern such as
@@ -42,7 +42,7 @@ def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None 
     named = list(words)
     several = len(named) > 1
     found = [part for word in named for part in _of_word(word, Path(), cell, job, several)]
-    parts: dict[str, Part] = {}
+    parts: dict[str, BatchPart] = {}
     for part in sorted(found, key=lambda one: one.key):
         other = parts.setdefault(part.key, part)
         if other.file.resolve() != part.file.resolve() or (other.cell, other.job) != (part.cell, part.job):
@@ -52,7 +52,9 @@ def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None 
     return list(parts.values())
 
 
-def _of_word(word: str, beside: Path, cell: Path | None, job: Path | None, several: bool) -> Iterator[Part]:
+def _of_word(
+    word: str, beside: Path, cell: Path | None, job: Path | None, several: bool
+) -> Iterator[BatchPart]:
     """Yield the parts of a word; relative names begin at the folder ``beside``."""
     if word.startswith(_SIGN_OF_LIST) and not (beside / word).exists():
         yield from _of_list(Path(beside / word[1:]), cell, job)
@@ -63,7 +65,7 @@ def _of_word(word: str, beside: Path, cell: Path | None, job: Path | None, sever
     elif place.suffix.lower() == ".toml":
         yield from _of_table(place)
     elif place.is_file():
-        yield Part(place.name if not beside.parts else _below(word), place, cell, job)
+        yield BatchPart(place.name if not beside.parts else _below(word), place, cell, job)
     elif glob.has_magic(word):
         yield from _of_pattern(word, beside, cell, job)
     else:
@@ -73,7 +75,7 @@ def _of_word(word: str, beside: Path, cell: Path | None, job: Path | None, sever
         )
 
 
-def _of_folder(folder: Path, cell: Path | None, job: Path | None, several: bool) -> Iterator[Part]:
+def _of_folder(folder: Path, cell: Path | None, job: Path | None, several: bool) -> Iterator[BatchPart]:
     files = [file for file in folder.rglob("*") if is_program_file(file.name) and file.is_file()]
     if not files:
         sentence = "no G-code in this folder"
@@ -87,10 +89,10 @@ def _of_folder(folder: Path, cell: Path | None, job: Path | None, several: bool)
     name = folder.resolve().name
     for file in files:
         below = file.relative_to(folder).as_posix()
-        yield Part(f"{name}/{below}" if several and name else below, file, cell, job)
+        yield BatchPart(f"{name}/{below}" if several and name else below, file, cell, job)
 
 
-def _of_pattern(word: str, beside: Path, cell: Path | None, job: Path | None) -> Iterator[Part]:
+def _of_pattern(word: str, beside: Path, cell: Path | None, job: Path | None) -> Iterator[BatchPart]:
     """Yield the files of a pattern; shells on Windows leave it to the program."""
     steps = PurePath(word).parts
     plain = next(k for k, step in enumerate(steps) if glob.has_magic(step))
@@ -100,10 +102,10 @@ def _of_pattern(word: str, beside: Path, cell: Path | None, job: Path | None) ->
         sentence = "no file is named like this"
         raise input_error("file-unreadable", sentence, "correct the pattern", source=str(beside / word))
     for file in files:
-        yield Part(file.relative_to(root).as_posix(), file, cell, job)
+        yield BatchPart(file.relative_to(root).as_posix(), file, cell, job)
 
 
-def _of_list(file: Path, cell: Path | None, job: Path | None) -> Iterator[Part]:
+def _of_list(file: Path, cell: Path | None, job: Path | None) -> Iterator[BatchPart]:
     """Yield the parts of a list: a word a line, relative to the list; ``#`` begins a comment."""
     try:
         text = file.read_text(encoding="utf-8-sig")
@@ -127,7 +129,7 @@ def _in_line(error: Gcode2KrlError, file: Path, number: int) -> NotUnderstoodErr
     return NotUnderstoodError(Issue("error", first.code, number, message, first.remedy), str(file))
 
 
-def _of_table(file: Path) -> Iterator[Part]:
+def _of_table(file: Path) -> Iterator[BatchPart]:
     """Yield the parts of a TOML file of ``[[folder]]``, each with its ``path``, ``cell`` and ``job``."""
     try:
         table = read_bounded_toml(file)
@@ -144,7 +146,7 @@ def _of_table(file: Path) -> Iterator[Part]:
         yield from _of_entry(entry, number, file)
 
 
-def _of_entry(entry: Any, number: int, file: Path) -> Iterator[Part]:
+def _of_entry(entry: Any, number: int, file: Path) -> Iterator[BatchPart]:
     place = f"[[folder]] number {number}"
     if not isinstance(entry, dict) or not isinstance(entry.get("path"), str):
         raise _wrong_table(file, f"{place} has no path")
@@ -155,7 +157,7 @@ def _of_entry(entry: Any, number: int, file: Path) -> Iterator[Part]:
     for part in _of_word(entry["path"], file.parent, cell, job, False):
         is_folder = (file.parent / entry["path"]).is_dir()
         key = f"{_below(entry['path'])}/{part.key}" if is_folder else part.key
-        yield Part(key.removeprefix("./"), part.file, cell, job)
+        yield BatchPart(key.removeprefix("./"), part.file, cell, job)
 
 
 def _wrong_table(file: Path, what: str) -> NotUnderstoodError:

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.batch.parts import Part
+from gcode2krl.batch.parts import BatchPart
 from gcode2krl.batch.work import Task
 from gcode2krl.cell.library import models_folder
 from gcode2krl.compiled.core import core_digest
@@ -41,7 +41,7 @@ _PLACES = ("report", "job_path", "search")
 class Planned:
     """A part, and what its batch does with it."""
 
-    part: Part
+    part: BatchPart
     task: Task
     inputs: tuple[Path, ...]
     """Files that no output may replace."""
@@ -64,7 +64,7 @@ class _Cell:
 
 
 def plan(
-    parts: Iterable[Part], order: Order, pages: bool = False, stated: Collection[str] | None = None
+    parts: Iterable[BatchPart], order: Order, pages: bool = False, stated: Collection[str] | None = None
 ) -> list[Planned]:
     """Return what to do for each part with the options of ``order``, and with ``pages`` a page for each.
 
@@ -92,7 +92,7 @@ def plan(
     ]
 
 
-def _order_of(part: Part, order: Order, stated: Collection[str] | None) -> Order:
+def _order_of(part: BatchPart, order: Order, stated: Collection[str] | None) -> Order:
     """Return the order of a part: its cell and job where it has its own, else its project's."""
     own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
     if stated is None:
@@ -114,7 +114,7 @@ def _read_cell(cell_path: str | Path | None, job_path: str | Path | None, *, alo
     return _Cell(cell_of(cell, cell_path)["sha256"], tuple(files), tuple(cell.program.externals))
 
 
-def _planned(part: Part, cell: _Cell, own: Order, page: str) -> Planned:
+def _planned(part: BatchPart, cell: _Cell, own: Order, page: str) -> Planned:
     try:
         size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
     except OSError:  # reading it reports it
@@ -143,15 +143,15 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
 # where programs go ------------------------------------------------------------------------------------------
 
 
-def program_name(part: Part, taken: Sequence[str]) -> str:
+def program_name(part: BatchPart, taken: Sequence[str]) -> str:
     """Return the name of a part's program: the file's, or one made from it that a controller takes."""
     stem = program_stem(part.key)
     return suggested_name(stem, taken) if name_problem(stem, taken) else stem
 
 
-def refuse_collisions(parts: Iterable[Part], name_of: Callable[[Part], str]) -> None:
+def refuse_collisions(parts: Iterable[BatchPart], name_of: Callable[[BatchPart], str]) -> None:
     """Raise `NotUnderstoodError` where two parts of one folder have one program name; names both."""
-    seen: dict[str, Part] = {}
+    seen: dict[str, BatchPart] = {}
     for part in parts:
         place = f"{part.folder}{name_of(part)}"
         other = seen.setdefault(place.casefold(), part)  # neither KRL nor Windows tells case apart
@@ -160,9 +160,9 @@ def refuse_collisions(parts: Iterable[Part], name_of: Callable[[Part], str]) -> 
             raise input_error("output-is-input", sentence, "rename one of them")
 
 
-def alike(parts: Iterable[Part], name_of: Callable[[Part], str]) -> Mapping[str, Issue]:
+def alike(parts: Iterable[BatchPart], name_of: Callable[[BatchPart], str]) -> Mapping[str, Issue]:
     """Return part → finding for parts of different folders whose programs have one name."""
-    of_name: dict[str, list[Part]] = {}
+    of_name: dict[str, list[BatchPart]] = {}
     for part in parts:
         of_name.setdefault(name_of(part).casefold(), []).append(part)
     findings = {}

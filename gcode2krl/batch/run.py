@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gcode2krl.batch.cache import Cache
-from gcode2krl.batch.crew import Answer, crew_of
+from gcode2krl.batch.crew import TaskAnswer, crew_of
 from gcode2krl.batch.free_memory import expected_mb
 from gcode2krl.batch.planning import Planned
 from gcode2krl.batch.results import Record, failed, line_of, why_failed, write_outputs
@@ -30,7 +30,7 @@ class Workers(Protocol):
         tasks: Sequence[Any],
         costs_mb: Sequence[float],
         order: Sequence[int] | None = None,
-    ) -> Iterator[Answer]:
+    ) -> Iterator[TaskAnswer]:
         """Yield the answer of each task as it is finished."""
 
 
@@ -55,18 +55,18 @@ def run_batch(
     """
     all_bytes = sum(map(_weight, planned))
     done_bytes = 0.0
-    left = []
+    to_compute = []
     for one in planned:
         record = _from_cache(one, out, cache)
         if record is None:
-            left.append(one)
+            to_compute.append(one)
             continue
         done_bytes += _weight(one)
         yield Line(record, done_bytes / all_bytes)
-    for one, record in _computed(left, out, workers, cache):
+    for one, record in _computed(to_compute, out, workers, cache):
         done_bytes += _weight(one)
         yield Line(record, done_bytes / all_bytes)
-    if cache is not None and left:
+    if cache is not None and to_compute:
         cache.prune()
 
 
@@ -131,7 +131,7 @@ def _has_whole_tables(planned: Planned) -> bool:
     return bool(planned.task.page) or planned.task.order.compensate is not None
 
 
-def _finished(planned: Planned, answer: Answer, out: Path, cache: Cache | None) -> Record:
+def _finished(planned: Planned, answer: TaskAnswer, out: Path, cache: Cache | None) -> Record:
     """Write the files of a part, keep them in the cache, and return its line."""
     try:
         if answer.failure:

@@ -2,7 +2,7 @@
 
 from gcode2krl.canned.catalogue import NAMES, PROGRAMS, REPEAT, CannedProgram
 from gcode2krl.canned.draft import Draft, around_minutes
-from gcode2krl.canned.place import Place, place_of
+from gcode2krl.canned.place import ProgramPlace, place_of
 from gcode2krl.canned.program import draft_of, gcode_of, minutes_of, predicted, targets_of
 
 __all__ = [
@@ -11,7 +11,7 @@ __all__ = [
     "REPEAT",
     "CannedProgram",
     "Draft",
-    "Place",
+    "ProgramPlace",
     "around_minutes",
     "draft_of",
     "gcode_of",

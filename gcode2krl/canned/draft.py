@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl.canned.place import Place, Point
+from gcode2krl.canned.place import Point, ProgramPlace
 from gcode2krl.canned.turning import Pose, Turn
 from gcode2krl.cell import Cell
 from gcode2krl.units import S_PER_MIN
@@ -20,7 +20,7 @@ DIAGONAL = np.array([1.0, 1.0, -1.0]) / 3.0**0.5
 """Nothing goes above the program's place: a stock is guessed below the feeds of what rises above them."""
 REFERENCES = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, -0.2))
 """The three points that every program measures first and last, in units of its size."""
-Turning = Callable[[Pose, Place, Cell], Turn]
+Turning = Callable[[Pose, ProgramPlace, Cell], Turn]
 
 
 class State(NamedTuple):
@@ -45,7 +45,7 @@ def around_minutes() -> float:
 class Draft:
     """A program as it grows. Points are relative to its place."""
 
-    place: Place
+    place: ProgramPlace
     lines: list[str] = field(default_factory=list)
     turns: list[tuple[int, Turning]] = field(default_factory=list)
     """After the move of this line the tool turns."""

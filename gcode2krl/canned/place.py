@@ -17,7 +17,7 @@ _IDLE_RPM = 1000.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class ProgramPlace:
     """Where a program runs, how large it is and how fast."""
 
     origin_mm: Point
@@ -40,7 +40,7 @@ def place_of(
     at_mm: Point | None = None,
     size_mm: float = SIZE_MM,
     percent: float = _MOST_PERCENT,
-) -> Place:
+) -> ProgramPlace:
     """Return the place of a program in a cell, by default that of the controller's test.
 
     Raises
@@ -62,7 +62,7 @@ def place_of(
         )
     tool = mounted_tool(cell)
     most = most_rpm(cell, tool)
-    return Place(
+    return ProgramPlace(
         origin_mm=origin_of(cell, at_mm),
         size_mm=float(size_mm),
         percent=float(percent),

@@ -12,7 +12,7 @@ from gcode2krl import gcode
 from gcode2krl.arrays import Floats
 from gcode2krl.canned.catalogue import PROGRAMS
 from gcode2krl.canned.draft import Draft
-from gcode2krl.canned.place import Place
+from gcode2krl.canned.place import ProgramPlace
 from gcode2krl.canned.turning import Pose, Turn
 from gcode2krl.cell import Cell
 from gcode2krl.chain import Plan, collect, prepare
@@ -29,7 +29,7 @@ COARSE_S = 0.048
 _END = re.compile(r"^\s*(N\d+\s*)?(M0?2|M30|%)\s*(\(.*\)|;.*)?$", re.IGNORECASE)
 
 
-def draft_of(name: str, place: Place, part: str | None = None) -> Draft:
+def draft_of(name: str, place: ProgramPlace, part: str | None = None) -> Draft:
     """Return a program's lines; ``part`` is the G-code that ``repeat`` runs.
 
     Raises `NotUnderstoodError` where a part is given to a program that takes none, or the other way round.

@@ -7,7 +7,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl import robot
 from gcode2krl.arrays import Floats
-from gcode2krl.canned.place import Place
+from gcode2krl.canned.place import ProgramPlace
 from gcode2krl.cell import Cell
 from gcode2krl.units import RAD_PER_DEG
 
@@ -71,7 +71,7 @@ class Turn:
     """(k,)"""
 
 
-def tilts(pose: Pose, place: Place, cell: Cell) -> Turn:
+def tilts(pose: Pose, place: ProgramPlace, cell: Cell) -> Turn:
     """Return turns of the tool about its tip, each from the pose and back to it.
 
     Half of each turn is made on the way up and half on the way down: on the spot it would be as fast as the
@@ -94,7 +94,7 @@ def tilts(pose: Pose, place: Place, cell: Cell) -> Turn:
     )
 
 
-def _widest(direction: Floats, angles_rad: Floats, pose: Pose, place: Place, cell: Cell) -> Floats:
+def _widest(direction: Floats, angles_rad: Floats, pose: Pose, place: ProgramPlace, cell: Cell) -> Floats:
     """Return the first tilt A, B, C (3,) in rad whose way is clear, or the last one."""
     for angle_rad in angles_rad[:-1]:
         if _is_clear(angle_rad * direction, pose, place, cell):
@@ -102,15 +102,15 @@ def _widest(direction: Floats, angles_rad: Floats, pose: Pose, place: Place, cel
     return np.asarray(angles_rad[-1] * direction)
 
 
-def _is_clear(tilt_rad: Floats, pose: Pose, place: Place, cell: Cell) -> bool:
+def _is_clear(tilt_rad: Floats, pose: Pose, place: ProgramPlace, cell: Cell) -> bool:
     """Tell whether a tilt about the tip stays in the pose's branch, off its limits and its singularity."""
     rotation = pose.rotation @ fr.rotation_from_abc(_WAY[:, None] * tilt_rad)
     quaternion = fr.quaternion_from_rotation(np.concatenate([pose.rotation[None], rotation]))
     position_mm = np.repeat(pose.position_mm[None], len(quaternion), axis=0)
     branches = robot.inverse(position_mm, quaternion, cell, place.tool)
     off = branches[0] - pose.q_rad
-    own = int(np.nanargmin(np.abs(np.sin(off / 2.0)).sum(axis=1)))
-    q_rad = np.unwrap(np.concatenate([pose.q_rad[None], branches[1:, own]]), axis=0)
+    branch = int(np.nanargmin(np.abs(np.sin(off / 2.0)).sum(axis=1)))
+    q_rad = np.unwrap(np.concatenate([pose.q_rad[None], branches[1:, branch]]), axis=0)
     if not np.isfinite(q_rad).all() or (np.abs(q_rad[:, 4]) < _CLEAR_RAD).any():
         return False
     limits_deg = cell.robot.limits.q_deg
@@ -120,7 +120,7 @@ def _is_clear(tilt_rad: Floats, pose: Pose, place: Place, cell: Cell) -> bool:
     return bool((q_rad > low + _CLEAR_RAD).all() and (q_rad < high - _CLEAR_RAD).all())
 
 
-def joint_reversals(joint: int, pose: Pose, place: Place, cell: Cell) -> Turn:
+def joint_reversals(joint: int, pose: Pose, place: ProgramPlace, cell: Cell) -> Turn:
     """Return moves of one joint to both sides of a pose, at each speed."""
     lever_mm = max(_lever_mm(joint, pose, place, cell), 1.0)
     reach_rad = min(_MOST_JOINT_RAD, _REACH_SHARE * place.size_mm / lever_mm)
@@ -144,7 +144,7 @@ def joint_reversals(joint: int, pose: Pose, place: Place, cell: Cell) -> Turn:
     )
 
 
-def _lever_mm(joint: int, pose: Pose, place: Place, cell: Cell) -> float:
+def _lever_mm(joint: int, pose: Pose, place: ProgramPlace, cell: Cell) -> float:
     """Return how far the tip moves for a turn of a joint, mm/rad."""
     jacobian = robot.jacobian(pose.q_rad[None], cell, place.tool)[0]
     return float(np.linalg.norm(jacobian[:3, joint]))

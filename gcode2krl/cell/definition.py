@@ -6,7 +6,7 @@ over is listed in ``taken_over``. Without a file, the demonstration cell serves:
 Hähn & Weigold 2020. Every key carries its unit; `sections` has the tables.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -16,7 +16,6 @@ from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import carriers
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE, described_schema
-from gcode2krl.cell.looks import cell_html, cell_words
 from gcode2krl.cell.sections import (
     Axis,
     Cables,
@@ -51,7 +50,31 @@ from gcode2krl.cell.sections import (
 )
 from gcode2krl.cell.sections.external import EXTERNAL_NAMES, ExternalAxis, ExternalName
 from gcode2krl.cell.sections.online import Online
+from gcode2krl.exchange.html import block, text_table
 from gcode2krl.units import RAD_PER_DEG
+
+# A cell on one line, and as a notebook shows it.
+
+_MOST_LETTERS = 40
+"""Of a name on one line."""
+
+
+def cell_words(name: str, robot: str, tools: int, is_confirmed: bool) -> str:
+    """Return ``my cell: KR 300 R2500 ultra, 3 tools, not verified``."""
+    facts = [robot[:_MOST_LETTERS] or "no robot", f"{tools} tool{'' if tools == 1 else 's'}"]
+    facts.append("verified" if is_confirmed else "not verified")
+    return f"{name[:_MOST_LETTERS] or 'without a name'}: {', '.join(facts)}"
+
+
+def cell_html(title: str, facts: Mapping[str, object], tools: Mapping[int, Sequence[object]]) -> str:
+    """Return the facts of a cell and its tools (model, diameter, teeth, length) as HTML."""
+    rows = [(name, "not stated" if value is None or value == "" else value) for name, value in facts.items()]
+    listed = [
+        (f"T{number}", *("" if value is None else value for value in tool)) for number, tool in tools.items()
+    ]
+    head = ("tool", "model", "diameter (mm)", "teeth", "length (mm)")
+    return block(title, text_table((), rows), text_table(head, listed) if listed else "")
+
 
 CODES_WITHOUT_SIGNALS = {
     "M0": "HALT",

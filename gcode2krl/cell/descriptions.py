@@ -82,12 +82,12 @@ def described_schema(cell: type[BaseModel]) -> dict[str, Any]:
 
 def _all_sections(cell: type[BaseModel]) -> list[type[BaseModel]]:
     """Return the sections of a cell as far as a file can state them, the cell first."""
-    found = [cell]
-    for section in found:  # grows while it is read
+    models = [cell]
+    for section in models:  # grows while it is read
         for key, field in section.model_fields.items():
             if key not in NOT_OF_A_FILE:
-                found += [one for one in dict.fromkeys(sections_in(field.annotation)) if one not in found]
-    return found
+                models += [one for one in dict.fromkeys(sections_in(field.annotation)) if one not in models]
+    return models
 
 
 def _drop_unused(schema: dict[str, Any]) -> None:

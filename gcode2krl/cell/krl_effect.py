@@ -37,7 +37,7 @@ _COMPARE = {
 
 
 @dataclass(frozen=True)
-class Signal:
+class OutputSignal:
     """A signal after the text: ``$OUT[3]``, ``$ANOUT[1]``, or the integrator's name for one."""
 
     values: frozenset[Value]
@@ -68,7 +68,7 @@ class Signal:
 class Effect:
     """What a text does from its first statement to its last."""
 
-    signals: Mapping[str, Signal]
+    signals: Mapping[str, OutputSignal]
     wait_s: float
     """What it surely waits by ``WAIT SEC``."""
     longest_wait_s: float
@@ -142,7 +142,7 @@ def effect_of(text: str) -> Effect:
 
 @dataclass
 class _State:
-    signals: dict[str, Signal] = field(default_factory=dict)
+    signals: dict[str, OutputSignal] = field(default_factory=dict)
     clock_s: float = 0.0
     event: int = 1
     levels: dict[Level, int] = field(default_factory=dict)
@@ -161,7 +161,7 @@ def _joined(a: _State | None, b: _State | None) -> _State | None:
     signals = {}
     for name in {**a.signals, **b.signals}:
         both = [(state, state.signals[name]) for state in (a, b) if name in state.signals]
-        signals[name] = Signal(
+        signals[name] = OutputSignal(
             values=frozenset().union(*(signal.values for _, signal in both)),
             sure=len(both) == 2 and all(signal.sure for _, signal in both),
             pulsed=any(signal.pulsed for _, signal in both),
@@ -278,14 +278,14 @@ class _Run:
         elif word == w.WAIT:
             return self._wait(state, line)
         elif pulse := PULSE_FORM.match(line):
-            self._set(state, pulse[1], Signal(frozenset((pulse[2] != "TRUE",)), sure=True, pulsed=True))
+            self._set(state, pulse[1], OutputSignal(frozenset((pulse[2] != "TRUE",)), sure=True, pulsed=True))
         elif assigned := _SET.match(line):
             value = _value(assigned[2])
             if assigned[1].startswith("$") or isinstance(value, bool):
-                self._set(state, assigned[1], Signal(frozenset((value,)), sure=True))
+                self._set(state, assigned[1], OutputSignal(frozenset((value,)), sure=True))
         return state
 
-    def _set(self, state: _State, name: str, signal: Signal) -> None:
+    def _set(self, state: _State, name: str, signal: OutputSignal) -> None:
         before = state.signals.get(name.replace(" ", ""))
         state.signals[name.replace(" ", "")] = replace(
             signal,

@@ -164,12 +164,12 @@ class _Codes:
     def runs(self, m_code: str) -> Iterator[Issue]:
         """Yield what M3 or M4 switches on that is not its direction, or does not switch on."""
         own_key, other_key = _RUNS[m_code]
-        own, other = self.out(own_key), self.out(other_key)
+        output, other = self.out(own_key), self.out(other_key)
         key, cases = f"m_code.{m_code}", self.of(m_code)
         for case in cases:
             effect = case.effect
-            if other is not None and other != own and other in effect.driven():
-                both = f"both {own} and {other}" if own in effect.driven() else other
+            if other is not None and other != output and other in effect.driven():
+                both = f"both {output} and {other}" if output in effect.driven() else other
                 text = f"switches on {both}: {other} is spindle.{other_key}, the other direction"
                 yield _issue("error", key, text)
                 return
@@ -177,11 +177,11 @@ class _Codes:
             effect, at = case.effect, f" at S{case.rpm:g}" if len(cases) > 1 else ""
             if effect.calls:
                 return
-            if own is not None:
-                signal = effect.signals.get(own)
+            if output is not None:
+                signal = effect.signals.get(output)
                 if signal is None or not signal.surely_on:
                     perhaps = signal is not None and signal.driven
-                    text = f"does not {'always ' if perhaps else ''}switch on {own}, spindle.{own_key}{at}"
+                    text = f"does not {'always ' if perhaps else ''}switch on {output}, spindle.{own_key}{at}"
                     is_doubt = bool(effect.stops) or perhaps
                     yield _issue(self.severity(key, own_key, is_doubt=is_doubt), key, text)
                     return
@@ -316,14 +316,14 @@ class _Codes:
     def coolant(self, m_code: str) -> Iterator[Issue]:
         """Yield M7 and M8 that do not switch on the output that ``[spindle]`` names."""
         own_key, other_key = _COOLANTS[m_code]
-        own, other = self.out(own_key), self.out(other_key)
+        output, other = self.out(own_key), self.out(other_key)
         for case in self.of(m_code):
             effect = case.effect
-            signal = effect.signals.get(own or "")
-            if own is None or effect.calls or (signal is not None and signal.surely_on):
+            signal = effect.signals.get(output or "")
+            if output is None or effect.calls or (signal is not None and signal.surely_on):
                 continue
             perhaps = signal is not None and signal.driven
-            text = f"does not {'always ' if perhaps else ''}switch on {own}, spindle.{own_key}"
+            text = f"does not {'always ' if perhaps else ''}switch on {output}, spindle.{own_key}"
             text += f", but {other}, spindle.{other_key}" if other in effect.driven() else ""
             is_doubt = bool(effect.stops) or perhaps
             key = f"m_code.{m_code}"
@@ -351,10 +351,12 @@ class _Codes:
             m_code = key.removeprefix("m_code.")
             for case in cases[-1:]:
                 effect = case.effect
-                left = effect.on() & (spindle | coolant if key in _END else spindle)
-                if left and (key in _END or key == "program.prologue"):
+                left_on = effect.on() & (spindle | coolant if key in _END else spindle)
+                if left_on and (key in _END or key == "program.prologue"):
                     severity: Severity = "error" if key in _END else "warning"
-                    yield _issue(severity, key, f"switches on {_listed(left)}, which M3, M7 or M8 switch on")
+                    yield _issue(
+                        severity, key, f"switches on {_listed(left_on)}, which M3, M7 or M8 switch on"
+                    )
                 spindle_alone = spindle - coolant
                 ends = {name for name in effect.signals if not effect.signals[name].driven}
                 if key.startswith("m_code.") and m_code not in _MAY_STOP_SPINDLE and spindle_alone & ends:

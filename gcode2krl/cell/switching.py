@@ -95,9 +95,9 @@ def pair_issues(templates: Mapping[str, str], view: Mapping[str, Any]) -> Iterat
         elif on_key in texts and off_key in texts:
             ends = [effect_of(text) for text in texts[off_key]]
             switched_on = frozenset().union(*(effect_of(text).on() for text in texts[on_key]))
-            left = switched_on - frozenset.intersection(*(end.off() for end in ends))
-            if left:
-                names, called = ", ".join(sorted(left)), ends[0].calls
+            left_on = switched_on - frozenset.intersection(*(end.off() for end in ends))
+            if left_on:
+                names, called = ", ".join(sorted(left_on)), ends[0].calls
                 text = f"{on_key} switches on {names}, which {off_key} does not switch off"
                 if called:
                     text += f", unless {called[0]} does"

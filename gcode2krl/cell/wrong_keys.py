@@ -1,17 +1,37 @@
 """What is wrong in a cell file: keys and values that are not allowed, and what only several keys show."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from gcode2krl.cell import carriers, ranges, switching
 from gcode2krl.cell.base import StatedCell, split_pairs
 from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.definition import Cell, plain_view
-from gcode2krl.cell.keys import meant_key
+from gcode2krl.cell.descriptions import NOT_OF_A_FILE, sections_in
+from gcode2krl.codes import closest
 from gcode2krl.errors import Issue
+
+# The key of a cell that a mistyped one most likely means: the closest key of its section.
+
+
+def meant_key(cell: type[BaseModel], place: Sequence[str | int]) -> str:
+    """Return the dotted key that an unknown key at ``place`` most likely means; empty if none is close."""
+    *above, last = place
+    kinds: list[type[BaseModel]] = [cell]
+    written: list[str] = []
+    for step in above:
+        below = [kind.model_fields[str(step)].annotation for kind in kinds if str(step) in kind.model_fields]
+        if below:  # else the number of a tool, an entry of a list or the name of a work offset
+            kinds = [model for annotation in below for model in sections_in(annotation)]
+        written.append(str(step))
+    known = [name for kind in kinds for name in kind.model_fields if name not in NOT_OF_A_FILE]
+    without_unit = [name for name in known if name.rpartition("_")[0] == str(last)]
+    near = without_unit[0] if without_unit else closest(str(last), known)
+    return ".".join([*written, near]) if near else ""
+
 
 _MOST_ISSUES = 100
 _KEYS_LISTED = "docs/cell.md and `gcode2krl models schema` list the keys"

@@ -133,9 +133,9 @@ class ArmInStock:
         """
         for way in inside.ways:
             self._judge_way(way)
-        told = set(self._hit_lines)
+        known_lines = set(self._hit_lines)
         for before, after, stood, stands, line in zip(*inside[:5], strict=True):
-            if int(line) not in told:
+            if int(line) not in known_lines:
                 before = before if np.isfinite(before).all() else after  # behind what is out of reach
                 place = _Place(int(line))
                 q_rad, external = np.stack([before, after]), np.stack([stood, stands])

@@ -32,7 +32,7 @@ def collisions_beside(ways: Iterable[Beside], targets: Targets, cell: Cell) -> t
     if watch is None:
         return ()
     for way in ways:
-        found = watch.way(
+        clearances = watch.way(
             way.q_rad,
             way.tool,
             way.line,
@@ -41,7 +41,7 @@ def collisions_beside(ways: Iterable[Beside], targets: Targets, cell: Cell) -> t
             against_raw=way.is_uncut,
             external=way.external,
         )
-        if way.is_ptp and found.hits:
+        if way.is_ptp and clearances.hits:
             ptp = Ptp(targets, way.row, way.q_rad[0], way.q_rad[-1])
             watch.advise(way.line, way.words, _advice(ptp, cell, against_raw=way.is_uncut))
     return watch.issues()
@@ -59,7 +59,7 @@ def _advice(ptp: Ptp, cell: Cell, *, against_raw: bool) -> str:
         return not watch.way(way, tool, 0, "", is_ptp=True, against_raw=against_raw).hits
 
     stays = (ptp.targets.external[ptp.row] == ptp.targets.external[ptp.row - 1]).all()
-    found = proposal(ptp, cell, is_free) if stays else ""
+    remedy = proposal(ptp, cell, is_free) if stays else ""
     at_home = ptp.targets.home[ptp.row] or ptp.targets.home[ptp.row - 1]
     other = "put HOME elsewhere" if at_home else "cut in another order"
-    return found or f"{other}, or move what is hit: no higher [clearance] z_mm or turn of A1 alone is free"
+    return remedy or f"{other}, or move what is hit: no higher [clearance] z_mm or turn of A1 alone is free"

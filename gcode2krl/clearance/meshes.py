@@ -23,14 +23,14 @@ def triangles_of(file: str) -> Floats:
 
 def obstacle_meshes(cell: Cell) -> dict[str, Floats]:
     """Return the triangles (t, 3, 3) of obstacles by name, in their frames, of files that can be read."""
-    found = {}
+    meshes = {}
     for obstacle in cell.obstacle:
         if obstacle.mesh is not None:
             try:
-                found[obstacle.name] = triangles_of(obstacle.mesh)
+                meshes[obstacle.name] = triangles_of(obstacle.mesh)
             except Gcode2KrlError:
                 continue
-    return found
+    return meshes
 
 
 @lru_cache(maxsize=8)

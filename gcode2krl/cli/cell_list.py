@@ -59,9 +59,11 @@ def _robot_name(robot: Robot) -> str:
 
 def _loads(cell: Cell) -> Iterator[Row]:
     """Yield ``$LOAD``, and that of each tool that has its own."""
-    own = {f"$LOAD with T{number}": tool.load for number, tool in cell.tool.items() if tool.load is not None}
-    every = {"$LOAD": cell.load} if len(own) < len(cell.tool) or not cell.tool else {}
-    for name, load in {**every, **own}.items():
+    loads = {
+        f"$LOAD with T{number}": tool.load for number, tool in cell.tool.items() if tool.load is not None
+    }
+    every = {"$LOAD": cell.load} if len(loads) < len(cell.tool) or not cell.tool else {}
+    for name, load in {**every, **loads}.items():
         centre = f"at X {load.x_mm:g} Y {load.y_mm:g} Z {load.z_mm:g}"
         inertia = f"J {load.jx_kgm2:g} {load.jy_kgm2:g} {load.jz_kgm2:g} kgm2"
         weight = f"{load.mass_kg:g} kg {centre}, {inertia}" if load.mass_kg is not None else MISSING

@@ -176,8 +176,8 @@ def _save_figure(fit: "ForceFit", file: Path) -> Path:
         for axis, axes in enumerate(figure.subplots(3, 1, sharex=True)):
             axes.plot(*thin(fit.time_s, fit.measured_N[:, axis]), color=BLUE, lw=0.9, label="measured")
             axes.plot(*thin(fit.time_s, fit.fitted_N[:, axis]), color=VERMILION, lw=0.9, label="fitted")
-            rest = fit.measured_N[:, axis] - fit.fitted_N[:, axis]
-            axes.plot(*thin(fit.time_s, rest), color=GREY, lw=0.6, label="rest")
+            residual = fit.measured_N[:, axis] - fit.fitted_N[:, axis]
+            axes.plot(*thin(fit.time_s, residual), color=GREY, lw=0.6, label="rest")
             axes.set_ylabel(f"F{'xyz'[axis]} (N)")
         axes.set_xlabel("Time (s)")
         handles, names = axes.get_legend_handles_labels()

@@ -13,7 +13,7 @@ from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError, input_erro
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
-    from gcode2krl.cell.setup.controller import Controller
+    from gcode2krl.cell.setup.controller import ArchivedController
 
 SCHEMA = "gcode2krl-cell.schema.json"
 """Name of the schema that is written beside a cell file, for editors."""
@@ -60,7 +60,7 @@ def command(
     """
     from gcode2krl.cell.setup.answers import completed, left_out, read_answers
     from gcode2krl.cell.setup.cell_text import text_of_cell
-    from gcode2krl.cell.setup.controller import Controller, read_controller
+    from gcode2krl.cell.setup.controller import ArchivedController, read_controller
     from gcode2krl.cli.cell_list import findings, missing_keys
     from gcode2krl.cli.init_dialogue import ask, questions_text
 
@@ -74,7 +74,7 @@ def command(
     if is_asked and not (sys.stdin.isatty() and sys.stdout.isatty()):
         sentence = "no terminal to ask questions at, and no --answers FILE"
         raise input_error("init-answer", sentence, "`gcode2krl init --questions` prints such a file")
-    controller = read_controller(archive) if archive is not None else Controller(source="")
+    controller = read_controller(archive) if archive is not None else ArchivedController(source="")
     _say_read(console, controller)
     given = ask(controller) if answers_path is None else read_answers(answers_path, controller)
     answers = completed(given, controller)
@@ -111,10 +111,10 @@ def _refuse_existing(cell_path: Path, force: bool) -> None:
 
 def _is_our_schema(path: Path) -> bool:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        schema = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(found, dict) and found.get("title") == "gcode2krl cell file"
+    return isinstance(schema, dict) and schema.get("title") == "gcode2krl cell file"
 
 
 def _resolved(text: str, cell_path: Path) -> "Cell":
@@ -151,7 +151,7 @@ def _write(cell_path: Path, text: str, inputs: list[Path]) -> None:
     write_together(files, inputs)
 
 
-def _say_read(console: Console, controller: "Controller") -> None:
+def _say_read(console: Console, controller: "ArchivedController") -> None:
     """Say what the archive states, and what of it no cell file can carry."""
     if not controller.source:
         return

@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from gcode2krl.cell.setup.answers import answer_of_words
-from gcode2krl.cell.setup.controller import Controller
+from gcode2krl.cell.setup.controller import ArchivedController
 from gcode2krl.cell.setup.questions import (
     MACHINE_QUESTIONS,
     PLACE_QUESTIONS,
     REFERENCE_QUESTIONS,
     TOOL_QUESTIONS,
-    Question,
+    CellQuestion,
 )
 
 
-def ask(controller: Controller) -> dict[str, Any]:
+def ask(controller: ArchivedController) -> dict[str, Any]:
     """Ask all questions that apply; what the archive states is proposed, and Enter accepts it."""
     import questionary
 
@@ -35,9 +35,9 @@ def ask(controller: Controller) -> dict[str, Any]:
 
 
 def _ask_each(
-    questions: Sequence[Question],
+    questions: Sequence[CellQuestion],
     answers: dict[str, Any],
-    controller: Controller,
+    controller: ArchivedController,
     taken: set[Any] | None = None,
 ) -> None:
     for question in questions:
@@ -45,13 +45,15 @@ def _ask_each(
             answers[question.key] = _ask_one(question, answers, controller, taken or set())
 
 
-def is_asked(question: Question, answers: dict[str, Any], controller: Controller) -> bool:
+def is_asked(question: CellQuestion, answers: dict[str, Any], controller: ArchivedController) -> bool:
     """Tell whether a question applies; one about the archive does if that has something to choose from."""
     listed = question.choices(controller) if question.of_archive and question.choices else [None]
     return question.when(answers) and bool(listed)
 
 
-def _ask_one(question: Question, answers: dict[str, Any], controller: Controller, taken: set[Any]) -> Any:
+def _ask_one(
+    question: CellQuestion, answers: dict[str, Any], controller: ArchivedController, taken: set[Any]
+) -> Any:
     import questionary
 
     proposal = question.proposal(controller, answers)
@@ -103,8 +105,8 @@ def questions_text() -> str:
     return head + _questions(general) + tools + _questions(TOOL_QUESTIONS)
 
 
-def _questions(questions: Sequence[Question]) -> str:
-    nobody = Controller(source="")
+def _questions(questions: Sequence[CellQuestion]) -> str:
+    nobody = ArchivedController(source="")
     lines = []
     for question in questions:
         lines.append(f"\n# {question.text}\n#   where: {question.where}")

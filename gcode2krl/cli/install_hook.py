@@ -105,10 +105,10 @@ def _homes() -> Iterator[tuple[Path, Path]]:
 def _macro_path(config: Path) -> Path | None:
     """Return the macro folder that the user has set in FreeCAD's preferences."""
     try:
-        found = _MACRO_PATH.search(config.read_text(encoding="utf-8", errors="replace"))
+        macro_path = _MACRO_PATH.search(config.read_text(encoding="utf-8", errors="replace"))
     except OSError:
         return None
-    place = Path(found[1]) if found is not None else None
+    place = Path(macro_path[1]) if macro_path is not None else None
     return place if place is not None and place.is_dir() else None
 
 

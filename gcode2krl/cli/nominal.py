@@ -39,8 +39,8 @@ def with_comparison(prediction: "Prediction", comparison: "Comparison", nominal:
     """Return the prediction with findings on the differences, and with the nominal part among its inputs."""
     content = Path(nominal).read_bytes()
     named = {KEY: Path(nominal).as_posix(), HASH_KEY: sha256(content).hexdigest()}
-    found = tuple(issues_of(prediction, comparison))
-    return replace(prediction, skipped=(*prediction.skipped, *found), inputs={**prediction.inputs, **named})
+    issues = tuple(issues_of(prediction, comparison))
+    return replace(prediction, skipped=(*prediction.skipped, *issues), inputs={**prediction.inputs, **named})
 
 
 def issues_of(prediction: "Prediction", comparison: "Comparison") -> list[Issue]:

@@ -70,10 +70,10 @@ def heading() -> Heading:
     context = click.get_current_context(silent=True)
     if context is None:
         return Heading()
-    found = context.ensure_object(Heading)
-    found.command = context.command_path.removeprefix("gcode2krl ")
-    found.options = _options_of(context)
-    return found
+    heading = context.ensure_object(Heading)
+    heading.command = context.command_path.removeprefix("gcode2krl ")
+    heading.options = _options_of(context)
+    return heading
 
 
 def _options_of(context: click.Context) -> dict[str, Any]:

@@ -29,11 +29,11 @@ def refuse_other_start(program: str, from_line: int | None) -> None:
     """
     try:
         with Path(program).open("rb") as file:
-            found = _RESTART.search(file.read(_HEAD_BYTES))
+            restart = _RESTART.search(file.read(_HEAD_BYTES))
     except OSError:
         return
-    if found and int(found[1]) != from_line:
-        line = int(found[1])
+    if restart and int(restart[1]) != from_line:
+        line = int(restart[1])
         sentence = f"the program is a restart: it begins at G-code line {line}"
         raise input_error("option-value", sentence, f"--from-line {line}", source=program)
 

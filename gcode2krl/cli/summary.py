@@ -67,8 +67,8 @@ def _collisions(cell: Cell, tools: list[int], *, is_cut: bool) -> Iterator[str]:
 
 
 def _duration(seconds: float) -> str:
-    minutes, rest = divmod(float(seconds), S_PER_MIN)
-    return f"{int(minutes)} min {rest:.1f} s" if minutes else f"{rest:.2f} s"
+    minutes, seconds_left = divmod(float(seconds), S_PER_MIN)
+    return f"{int(minutes)} min {seconds_left:.1f} s" if minutes else f"{seconds_left:.2f} s"
 
 
 def _files(written: WrittenProgram) -> str:

@@ -28,7 +28,7 @@ _EDGE_SHARE = 0.25
 """Radius of a spoke over that of the cylinder."""
 
 
-class Part(NamedTuple):
+class Capsule(NamedTuple):
     """One capsule."""
 
     name: str
@@ -43,44 +43,44 @@ class Part(NamedTuple):
     """The link of the second end, where that is another one."""
 
 
-def parts_of(cell: Cell, tool: int) -> list[Part]:
+def parts_of(cell: Cell, tool: int) -> list[Capsule]:
     """Return the capsules of the arm, its cables, and what is on its flange with a tool in the spindle."""
     return [*arm_and_spindle(cell), *_cables(cell), *_tool(cell, tool)]
 
 
-def arm_and_spindle(cell: Cell) -> list[Part]:
+def arm_and_spindle(cell: Cell) -> list[Capsule]:
     """Return the capsules of the arm and of what is on its flange whatever the tool."""
     return [*_arm(cell), *_spindle(cell)]
 
 
-def capsules_of(parts: list[Part], geometry: Floats) -> Bodies:
+def capsules_of(parts: list[Capsule], geometry: Floats) -> Bodies:
     """Return capsules as the core takes them."""
     ends = np.array([part.ends_mm for part in parts]).reshape(-1, 6)
     links = [(each.link, each.link if each.second_link is None else each.second_link) for each in parts]
     return bodies_of(links, ends, [part.radius_mm for part in parts], geometry)
 
 
-def _arm(cell: Cell) -> Iterator[Part]:
+def _arm(cell: Cell) -> Iterator[Capsule]:
     for capsule in cell.robot.body.capsules:
         ends = np.array([capsule.from_mm, capsule.to_mm])
-        yield Part(capsule.link, "arm", _LINKS[capsule.link], ends, capsule.radius_mm)
+        yield Capsule(capsule.link, "arm", _LINKS[capsule.link], ends, capsule.radius_mm)
 
 
-def _spindle(cell: Cell) -> Iterator[Part]:
+def _spindle(cell: Cell) -> Iterator[Capsule]:
     if cell.spindle.body is not None:
         for capsule in cell.spindle.body.capsules:
             ends = np.array([capsule.from_mm, capsule.to_mm])
-            yield Part("spindle", "spindle", FLANGE, ends, capsule.radius_mm)
+            yield Capsule("spindle", "spindle", FLANGE, ends, capsule.radius_mm)
 
 
-def _cables(cell: Cell) -> Iterator[Part]:
+def _cables(cell: Cell) -> Iterator[Capsule]:
     if cell.cables is not None:
         for capsule in cell.cables.capsules:
             ends = np.array([capsule.from_mm, capsule.to_mm])
-            yield Part(CABLES, "cables", ELBOW, ends, capsule.radius_mm, second_link=FLANGE)
+            yield Capsule(CABLES, "cables", ELBOW, ends, capsule.radius_mm, second_link=FLANGE)
 
 
-def _tool(cell: Cell, number: int) -> Iterator[Part]:
+def _tool(cell: Cell, number: int) -> Iterator[Capsule]:
     """Yield the cutter up to its holder, and the holder up to the gauge line, as far as they are stated."""
     tool = cell.tool.get(number)
     if tool is None or cell.missing_of_tool(number):
@@ -114,19 +114,21 @@ def holder_span_mm(tool: Tool) -> tuple[float, float] | None:
 
 def _cylinder(
     name: str, kind: Kind, frame: Floats, low_mm: float, high_mm: float, radius_mm: float
-) -> Iterator[Part]:
+) -> Iterator[Capsule]:
     wide_mm, edge_mm = radius_mm * _RIM, radius_mm * _EDGE_SHARE
     yield _along_axis(name, kind, frame, low_mm + wide_mm, max(high_mm, low_mm + wide_mm), wide_mm)
     for spoke in range(_SPOKES):
         angle = math.pi * spoke / _SPOKES
         out = (wide_mm - edge_mm) * np.array([math.cos(angle), math.sin(angle), 0.0])
         middle = np.array([0.0, 0.0, low_mm + edge_mm])
-        yield Part(name, kind, FLANGE, _moved(frame, np.stack([middle - out, middle + out])), edge_mm, True)
+        yield Capsule(
+            name, kind, FLANGE, _moved(frame, np.stack([middle - out, middle + out])), edge_mm, True
+        )
 
 
-def _along_axis(name: str, kind: Kind, frame: Floats, low: float, high: float, radius_mm: float) -> Part:
+def _along_axis(name: str, kind: Kind, frame: Floats, low: float, high: float, radius_mm: float) -> Capsule:
     ends = _moved(frame, np.array([[0.0, 0.0, low], [0.0, 0.0, high]]))
-    return Part(name, kind, FLANGE, ends, radius_mm)
+    return Capsule(name, kind, FLANGE, ends, radius_mm)
 
 
 def _moved(frame: Floats, points: Floats) -> Floats:

@@ -10,7 +10,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell, carriers
 from gcode2krl.cell.sections import Plane
 from gcode2krl.collision import scene
-from gcode2krl.collision.bodies import ELBOW, FOOT, FOREARM, UPPER_ARM, WRIST, Part
+from gcode2krl.collision.bodies import ELBOW, FOOT, FOREARM, UPPER_ARM, WRIST, Capsule
 
 ReadMesh = Callable[[str], Floats]
 """File of a mesh → its triangles (t, 3, 3) in mm."""
@@ -71,7 +71,7 @@ def _shape(
     return scene.mesh(read_mesh(str(mesh)) @ frame[:3, :3].T + frame[:3, 3])
 
 
-def pairs_of(parts: list[Part], names: tuple[str, ...]) -> list[Pair]:
+def pairs_of(parts: list[Capsule], names: tuple[str, ...]) -> list[Pair]:
     """Return who may hit what: (part, obstacle, 0), or (part, -1, other part) of the arm itself.
 
     The foot hits nothing, as it stands still, or on its rail. The table has no edge here, and parts of the
@@ -102,7 +102,7 @@ def pairs_of(parts: list[Part], names: tuple[str, ...]) -> list[Pair]:
 
 def is_held(
     pair: Pair,
-    parts: list[Part],
+    parts: list[Capsule],
     around: Surroundings,
     *,
     against_raw: bool,

@@ -67,8 +67,8 @@ class Contact(NamedTuple):
         motion, _, forces, _ = evaluated
         path_mm, sample = ways.place(motion).distinct()
         air: Bools = np.append(False, ~np.asarray(forces.force_base_N[sample].any(axis=1)))
-        beside = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
-        return cls(path_mm, _distance(path_mm, beside[1:]))
+        near_air = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
+        return cls(path_mm, _distance(path_mm, near_air[1:]))
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""
@@ -85,7 +85,7 @@ class Field(NamedTuple):
 
 
 @dataclass
-class Run:
+class LineRun:
     """A run of lines: places (n,) and minus the deflection there (n, 3), later ramped."""
 
     first: int
@@ -171,7 +171,7 @@ def _run(
     corner: Bools,
     contact: Contact,
     divided_mm: Floats,
-) -> Run:
+) -> LineRun:
     """Return minus the deflection along a run and at its ends, without the samples in the corners there.
 
     There are values at the samples, at the targets, and at ``divided_mm``, where lines are divided already.
@@ -187,7 +187,7 @@ def _run(
     if len(rows) == 0:  # shorter than a sample: the correction of its neighbour
         near = min(low, len(path_mm) - 1)
         places, ends = np.array([begin, end]), np.repeat(against[near : near + 1], 2, axis=0)
-        run = Run(first, last, places, ends, contact.air_at(places), np.array([-1, -1]))
+        run = LineRun(first, last, places, ends, contact.air_at(places), np.array([-1, -1]))
         run.ramp(float(ways.slope[first : last + 1].min()))
         return run
     places = np.concatenate([[begin], path_mm[rows], [end]])
@@ -198,7 +198,7 @@ def _run(
     more = np.concatenate([more, divided_mm[slice(*np.searchsorted(divided_mm, [begin, end]))]])
     every, of = np.unique(np.concatenate([places, more]), return_index=True)
     samples = np.concatenate([[-1], sample[rows], [-1], np.full(len(more), -1)])[of]
-    run = Run(first, last, every, interpolated(every, places, value), contact.air_at(every), samples)
+    run = LineRun(first, last, every, interpolated(every, places, value), contact.air_at(every), samples)
     run.ramp(float(ways.slope[first : last + 1].min()))
     return run
 
@@ -220,7 +220,7 @@ def _distance(path_mm: Floats, marked: Bools) -> Floats:
     return np.minimum(np.minimum(path_mm - before, after - path_mm), 1e6)
 
 
-def _tie(run: Run, ways: Ways, target_mm: Floats) -> None:
+def _tie(run: LineRun, ways: Ways, target_mm: Floats) -> None:
     """Ramp the values of a run to those of the targets at its ends, no steeper than its lines allow."""
     start = target_mm[run.first - 1] if ways.follows[run.first] else np.zeros(3)
     at_ends = run.value_mm[[0, -1]]
@@ -249,7 +249,7 @@ def _no_steeper(path_mm: Floats, value: Floats, slope: float) -> Floats:
     return middle
 
 
-def _corners(ways: Ways, runs: list[Run]) -> Floats:
+def _corners(ways: Ways, runs: list[LineRun]) -> Floats:
     """Return the shifts (p, 3) of the targets at the ends of runs; at a sharp corner that of both lines.
 
     There the shifted lines meet: the shift w solves N1·w = c1 and N2·w = c2, where N removes the component
@@ -290,13 +290,13 @@ def _on_curve(ways: Ways, row: Rows, value: Floats, tolerance_mm: float) -> Floa
     return result
 
 
-def _on_line(ways: Ways, row: int, run: Run, along_mm: Floats) -> Floats:
+def _on_line(ways: Ways, row: int, run: LineRun, along_mm: Floats) -> Floats:
     """Return the shifts (k, 3) at places of a line, normal to it."""
     value = interpolated(ways.begin_mm[row] + along_mm, run.path_mm, run.value_mm)
     return compliance.project_normal(value, ways.unit[row])
 
 
-def _division(ways: Ways, row: int, run: Run, fixed: Floats, tolerance_mm: float) -> Floats:
+def _division(ways: Ways, row: int, run: LineRun, fixed: Floats, tolerance_mm: float) -> Floats:
     """Return the places (q,) that divide a line: ``fixed``, and where the correction between is curved."""
     begin, length, least = ways.begin_mm[row], ways.length_mm[row], ways.piece_mm[row]
     inside = slice(*np.searchsorted(run.path_mm, [begin, begin + length]))

@@ -123,11 +123,11 @@ class Ways:
         row = np.where(motion.move >= 0, self.row_of[motion.move], -1)
         away = motion.position_mm - self.start_mm[row]
         along = np.einsum("ij,ij->i", away, self.unit[row])
-        beside = np.linalg.norm(away - along[:, None] * self.unit[row], axis=1)
+        off_mm = np.linalg.norm(away - along[:, None] * self.unit[row], axis=1)
         head, tail, reach_mm = self.stretched(shift_mm)
         along = (along - head[row]) / (self.length_mm + tail - head)[row] * self.length_mm[row]
         room = reach_mm + self.blend_mm[row] + np.append(0.0, self.blend_mm[:-1])[row] + 1e-6
-        on = (row >= 0) & (beside <= room) & (along >= -room) & (along <= self.length_mm[row] + room)
+        on = (row >= 0) & (off_mm <= room) & (along >= -room) & (along <= self.length_mm[row] + room)
         path = self.begin_mm[row] + np.clip(along, 0.0, self.length_mm[row])
         path = np.maximum.accumulate(np.where(on, path, 0.0))
         return Placed(np.where(on, row, -1), path)
@@ -165,9 +165,9 @@ def _pieces(targets: Targets, cell: Cell) -> tuple[Floats, Floats, Floats]:
     ahead = _PLANNED_AHEAD if controller.advance == "unlimited" else int(controller.advance)
     if ahead == 0:  # every target is an exact stop: each piece adds a stop
         return np.full(len(v), np.inf), np.zeros(len(v)), np.full(len(v), MOST_SLOPE)
-    own = np.maximum(targets.cdis_mm, np.append(0.0, targets.cdis_mm[:-1]))
+    reach = np.maximum(targets.cdis_mm, np.append(0.0, targets.cdis_mm[:-1]))
     piece = np.maximum(
-        v * (v / a_mm_s2 + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * own, _LEAST_PIECE_MM)
+        v * (v / a_mm_s2 + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * reach, _LEAST_PIECE_MM)
     )
     level = np.searchsorted(LEVELS_MM, piece / 2.0, side="right") - 1
     cdis = LEVELS_MM[level]

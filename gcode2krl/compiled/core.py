@@ -33,7 +33,7 @@ BUILD_VARIABLE = "GCODE2KRL_CORE"
 INT, FLOAT = ctypes.c_int64, ctypes.c_double
 
 
-class View(ctypes.Structure):
+class ArrayView(ctypes.Structure):
     """What C sees of an array."""
 
     _fields_ = (("at", ctypes.c_void_p), ("rows", ctypes.c_int64), ("columns", ctypes.c_int64))
@@ -47,7 +47,7 @@ class ArrayOf:
         self.dtype = np.dtype(dtype)
         self.written = written
 
-    def from_param(self, array: NDArray[Any]) -> View:
+    def from_param(self, array: NDArray[Any]) -> ArrayView:
         """Return the view; it holds no reference, so the array has to outlive the call."""
         flags = array.flags
         if array.dtype != self.dtype or not flags.c_contiguous or (self.written and not flags.writeable):
@@ -58,7 +58,7 @@ class ArrayOf:
             address = ctypes.addressof(ctypes.c_char.from_buffer(buffer))
         else:
             address = array.ctypes.data
-        return View(address, rows, array.size // rows if rows else 1)
+        return ArrayView(address, rows, array.size // rows if rows else 1)
 
 
 def _described(array: NDArray[Any]) -> str:
@@ -124,7 +124,7 @@ class StructOf:
 
 def _in_struct(kind: Any) -> Any:
     """Return the type of a field for ctypes."""
-    return View if isinstance(kind, ArrayOf) else kind.struct if isinstance(kind, StructOf) else kind
+    return ArrayView if isinstance(kind, ArrayOf) else kind.struct if isinstance(kind, StructOf) else kind
 
 
 _KINDS: Final[dict[Any, Any]] = {

@@ -1,7 +1,7 @@
 """Motion and stock to Forces: cutters, height field, engagement, force laws."""
 
 from gcode2krl.cutting.entry import depth_in_material, highest_below
-from gcode2krl.cutting.force import Load, cutting_load, mean_force
+from gcode2krl.cutting.force import ToolLoad, cutting_load, mean_force
 from gcode2krl.cutting.milling import (
     Approach,
     Contact,
@@ -20,11 +20,11 @@ from gcode2krl.cutting.outlook import Outlook, Watch, outlook_of
 __all__ = [
     "Approach",
     "Contact",
-    "Load",
     "Milling",
     "Outlook",
     "RawBox",
     "Removal",
+    "ToolLoad",
     "Watch",
     "cut",
     "cutting_load",

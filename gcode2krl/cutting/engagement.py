@@ -100,11 +100,11 @@ def engage(
     first = np.concatenate([[True], tool[1:] != tool[:-1]])
     tangents = _tangents(position, first) if direction is None else direction
     engagement = Engagement(field, tools, law, position, threads, nodes_per_diameter)
-    found = engagement.take(Points(position, tangents, tool, rapid, f_z_mm, wanted), ends=True)
+    engaged = engagement.take(Points(position, tangents, tool, rapid, f_z_mm, wanted), ends=True)
     engagement.write_back(field)
-    owner = np.minimum(found.rapid_row, len(found.result.a_p_mm) - 1)
-    np.maximum.at(found.result.overlap_mm[:, 0], owner, found.rapid_mm)
-    return found.result
+    owner = np.minimum(engaged.rapid_row, len(engaged.result.a_p_mm) - 1)
+    np.maximum.at(engaged.result.overlap_mm[:, 0], owner, engaged.rapid_mm)
+    return engaged.result
 
 
 class Engagement:
@@ -211,10 +211,10 @@ class Engagement:
         ``ends_mm`` (n, 6), in the frame of the field. The field lags a little behind the cutter.
         """
         ends, radius = np.ascontiguousarray(ends_mm), np.ascontiguousarray(radius_mm)
-        found = [strip.bodies_in(ends, radius, self._axis) for strip in self._strips]
-        deepest = np.argmax([depth for depth, _ in found], axis=0)
+        bodies = [strip.bodies_in(ends, radius, self._axis) for strip in self._strips]
+        deepest = np.argmax([depth for depth, _ in bodies], axis=0)
         rows = np.arange(len(ends))
-        depth, place = (np.stack(columns) for columns in zip(*found, strict=True))
+        depth, place = (np.stack(columns) for columns in zip(*bodies, strict=True))
         return depth[deepest, rows], place[deepest, rows]
 
     def write_back(self, field: HeightField) -> None:
@@ -242,9 +242,9 @@ class _Strip:
     def bodies_in(self, ends_mm: Floats, radius_mm: Floats, axis: int) -> tuple[Floats, Floats]:
         rows, columns = self.grid.height.shape
         across = (self._skip + 1, self._skip + 1 + self._own[1] - self._own[0])
-        own = (1, rows - 1, *across) if axis == 0 else (*across, 1, columns - LANES)
+        inner = (1, rows - 1, *across) if axis == 0 else (*across, 1, columns - LANES)
         depth, place = np.empty(len(ends_mm)), np.empty((len(ends_mm), 3))
-        _bodies(self.grid, ends_mm, radius_mm, np.array(own, dtype=np.int64), depth, place)
+        _bodies(self.grid, ends_mm, radius_mm, np.array(inner, dtype=np.int64), depth, place)
         return depth, place
 
     def write_back(self, field: HeightField, axis: int) -> None:

@@ -24,7 +24,7 @@ _ROUNDING_RAD = 1e-9
 
 
 @dataclass(frozen=True)
-class Load:
+class ToolLoad:
     """Load on the tool, n samples."""
 
     force_N: Floats
@@ -94,7 +94,7 @@ def cutting_load(
     ramp_rad: ArrayLike = 0.0,
     *,
     peak: bool = True,
-) -> Load:
+) -> ToolLoad:
     """Return mean force, torque and peak force (n) of any cutter of the library under a law of `law_array`.
 
     Arguments as in `mean_force`. Edges end at the flute length. The peak includes all teeth with their helix
@@ -105,10 +105,10 @@ def cutting_load(
     columns = _columns(phi_rad, a_p_mm, f_z_mm, ramp_rad)
     mean = _means(columns, tool.teeth, shape_of(tool), law)
     if not peak:
-        return Load(mean[:, :3], mean[:, 3], np.full(len(mean), np.nan))
+        return ToolLoad(mean[:, :3], mean[:, 3], np.full(len(mean), np.nan))
     # no mean exceeds its peak
     peaks = np.maximum(_peaks(columns, tool, law), np.linalg.norm(mean[:, :3], axis=1))
-    return Load(mean[:, :3], mean[:, 3], peaks)
+    return ToolLoad(mean[:, :3], mean[:, 3], peaks)
 
 
 def peak_force(

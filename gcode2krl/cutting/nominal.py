@@ -71,7 +71,7 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     turn[:3, :3] = removal.to_field
     wanted = mesh_of(solid_of(nominal)).apply_transform(turn)
     have, want = _heights(removal.part, wanted)
-    found: list[Difference] = []
+    differences: list[Difference] = []
     left_out: dict[Kind, int] = {}
     volume_mm3: dict[Kind, float] = {}
     kinds: tuple[tuple[Kind, Floats], ...] = (
@@ -86,8 +86,8 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
             rows, columns, mask = places[number]
             cut = _part_of(removal.part, rows, columns)
             pair = judged[rows, columns], want[rows, columns]
-            found.append(_difference(kind, volumes[number], cut, mask, *pair, removal, motion))
-    return Comparison(tuple(found), left_out, volume_mm3)
+            differences.append(_difference(kind, volumes[number], cut, mask, *pair, removal, motion))
+    return Comparison(tuple(differences), left_out, volume_mm3)
 
 
 def _heights(part: HeightField, nominal: "trimesh.Trimesh") -> tuple[Floats, Floats]:
@@ -103,8 +103,8 @@ def _highest(height: Floats, sign: int = 1) -> Floats:
     """Return the highest (sign 1) or the lowest (-1) of each cell and its eight neighbours."""
     from scipy.ndimage import maximum_filter
 
-    found: Floats = sign * maximum_filter(sign * height, size=3, mode="nearest")
-    return found
+    dilated: Floats = sign * maximum_filter(sign * height, size=3, mode="nearest")
+    return dilated
 
 
 def _sure(least_mm: Floats, difference_mm: Floats) -> Floats:

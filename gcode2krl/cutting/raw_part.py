@@ -48,9 +48,9 @@ def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: lis
     NotUnderstoodError
         Where a mesh cannot be read or the field would be too large.
     """
-    left = toolpath.restart.left if toolpath.restart is not None else None
-    if isinstance(left, HeightField):
-        return left.copy()
+    left_over = toolpath.restart.left if toolpath.restart is not None else None
+    if isinstance(left_over, HeightField):
+        return left_over.copy()
     stock = cell.stock
     own_mm = stock.resolution_mm if stock is not None else None
     if stock is not None and stock.mesh is not None:

@@ -68,14 +68,14 @@ def axes_mm(q_rad: Floats, lengths_mm: Floats, cell: Cell) -> Floats:
 
 def jacobian_base(q_rad: Floats, cell: Cell, tool: Ints32) -> Floats:
     """Return the Jacobian (m, 6, 6) of the tip along ``$BASE``: mm/rad over rad/rad."""
-    found = np.empty((len(q_rad), 6, 6))
+    jacobian = np.empty((len(q_rad), 6, 6))
     for number, rows in tool_rows(tool):
-        found[rows] = robot.jacobian(q_rad[rows], cell, number)
+        jacobian[rows] = robot.jacobian(q_rad[rows], cell, number)
     to_base = cell.base_matrix()[:3, :3].T
     if not np.array_equal(to_base, np.eye(3)):
-        found[:, :3] = to_base @ found[:, :3]
-        found[:, 3:] = to_base @ found[:, 3:]
-    return found
+        jacobian[:, :3] = to_base @ jacobian[:, :3]
+        jacobian[:, 3:] = to_base @ jacobian[:, 3:]
+    return jacobian
 
 
 def torque_Nm(jacobian: Floats, force_N: Floats, moment_Nmm: Floats) -> Floats:

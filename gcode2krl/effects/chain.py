@@ -175,10 +175,10 @@ def _pose(
         tcp = one.effect.yielding(tcp, cutting, inputs, one)
     for one in applied:
         tcp = one.effect.tcp(tcp, deflection, inputs, one)
-    found: dict[str, Any] = {"q_true_rad": q_true, "tcp_base_mm": tcp}
+    signals: dict[str, Any] = {"q_true_rad": q_true, "tcp_base_mm": tcp}
     if rotation:
-        found["tcp_rotation"] = _orientation(inputs, applied, q_true, load, softness)
-    return found
+        signals["tcp_rotation"] = _orientation(inputs, applied, q_true, load, softness)
+    return signals
 
 
 def _orientation(

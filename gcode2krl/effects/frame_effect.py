@@ -3,7 +3,7 @@
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Frame
 from gcode2krl.effects.effect import Applied
-from gcode2krl.effects.parameter import Bound, Parameter, Role
+from gcode2krl.effects.parameter import Bound, Parameter
 
 FRAME_NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
@@ -27,7 +27,6 @@ def frame_parameters(
             nominal=0.0,
             start=start,
             linear=True,
-            role=Role.SIZE,
             usual=usual,
             source=source,
         )

@@ -104,7 +104,6 @@ def size_from_zero(name: str, unit: str, *, high: float, start: float, source: s
         start=start,
         linear=True,
         minimum=0.0,
-        role=Role.SIZE,
         source=source,
     )
 

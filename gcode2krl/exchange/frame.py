@@ -96,7 +96,7 @@ def _for_pandas(values: NDArray[Any]) -> Any:
     return values.tolist() if values.dtype.kind == "U" else np.array(values)
 
 
-class Columns(Frame):
+class ColumnFrame(Frame):
     """Named columns that stand beside each other: ``samples["time_s"]`` is a numpy array."""
 
     def __init__(self, columns: Mapping[str, NDArray[Any]], what: str = _ROWS) -> None:

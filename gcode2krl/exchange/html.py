@@ -45,8 +45,8 @@ def beside(*parts: str) -> str:
 def column_table(title: str, columns: Mapping[str, NDArray[Any]], units: Mapping[str, str]) -> str:
     """Return each column with its unit, lowest and highest value."""
     rows = [(name, units.get(name, ""), *_range(values)) for name, values in columns.items()]
-    left = [paragraph(f"… and {len(rows) - _MOST_COLUMNS} more columns")] if len(rows) > _MOST_COLUMNS else []
-    return block(title, text_table(("column", "unit", "lowest", "highest"), rows[:_MOST_COLUMNS]), *left)
+    more = [paragraph(f"… and {len(rows) - _MOST_COLUMNS} more columns")] if len(rows) > _MOST_COLUMNS else []
+    return block(title, text_table(("column", "unit", "lowest", "highest"), rows[:_MOST_COLUMNS]), *more)
 
 
 def _range(values: NDArray[Any]) -> tuple[str, str]:

@@ -70,5 +70,5 @@ class Table(Frame):
         """Return what a notebook shows: the columns, the path from above where there is one, and findings."""
         position_mm = getattr(self, "position_mm", None)
         picture = "" if position_mm is None else path_picture(position_mm)
-        found = findings_block(self.issues) if self.issues else ""
-        return block("", beside(super()._repr_html_(), picture), found)
+        findings = findings_block(self.issues) if self.issues else ""
+        return block("", beside(super()._repr_html_(), picture), findings)

@@ -278,10 +278,10 @@ def _full_name(place: Path) -> str:
 
 def _stamp(place: Path) -> _Stamp:
     try:
-        found = place.stat()
+        state = place.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size  # no inode: network shares make them up
+    return state.st_mtime_ns, state.st_size  # no inode: network shares make them up
 
 
 @contextlib.contextmanager

@@ -28,19 +28,19 @@ _PIECE_BYTES = 1_000_000
 def possible_files(part: Path, folders: Sequence[Path]) -> tuple[Path, ...]:
     """Return the files whose content may belong to a program: none where it calls no subprogram."""
     places = tuple(dict.fromkeys((part.parent, *folders)))
-    found: set[Path] = set()
+    files: set[Path] = set()
     waiting = [part]
     while waiting:
         labels = _labels_called(waiting.pop())
         if labels is None:
-            return tuple(sorted(found | _all_files(places, part)))
+            return tuple(sorted(files | _all_files(places, part)))
         for label in sorted(labels):
             for of_fanuc in (False, True):
                 file = found_file(label, places, part.suffix, of_fanuc=of_fanuc)
-                if file is not None and file != part and file not in found:
-                    found.add(file)
+                if file is not None and file != part and file not in files:
+                    files.add(file)
                     waiting.append(file)
-    return tuple(sorted(found))
+    return tuple(sorted(files))
 
 
 def _all_files(places: Sequence[Path], part: Path) -> set[Path]:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from gcode2krl.ascii_codes import FIRST_FOREIGN
 from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import findings as f
-from gcode2krl.gcode import sentences
+from gcode2krl.gcode import findings, sentences
 from gcode2krl.gcode.excerpt import column, quote
 from gcode2krl.gcode.offset_issues import zero_issues
 from gcode2krl.gcode.slips import slip
@@ -76,8 +75,8 @@ _NOTES = {
 
 def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
     """Return the file lines that the findings and notes so far speak of."""
-    own = {int(line) for line in found["line"]}
-    return own | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
+    lines = {int(line) for line in found["line"]}
+    return lines | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
 
 
 def found_issues(
@@ -89,7 +88,7 @@ def found_issues(
     """
     rows = found[: counts["findings"]]
     issues = [_issue(row, texts) for row in rows]
-    misfits = [k for k, row in enumerate(rows) if row["number"] == f.ARC_RADIUS_MISMATCH]
+    misfits = [k for k, row in enumerate(rows) if row["number"] == findings.F.ARC_RADIUS_MISMATCH]
     if misfits:
         issues[misfits[0]] = _of_all_misfits(
             issues[misfits[0]], rows[misfits[0]], [int(rows[k]["line"]) for k in misfits], state
@@ -101,8 +100,8 @@ def found_issues(
         issues.append(Issue(severity, "more", 0, f"{dropped} more findings", "mend these first"))
     if counts["consequences"]:
         count = int(counts["consequences"])
-        rest = "1 more finding rests" if count == 1 else f"{count} more findings rest"
-        sentence = f"{rest} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
+        what = "1 more finding rests" if count == 1 else f"{count} more findings rest"
+        sentence = f"{what} on the errors above and " + ("is not listed" if count == 1 else "are not listed")
         issues.append(Issue("note", "consequences", 0, sentence, "mend the errors, then read again"))
     return issues
 
@@ -115,7 +114,7 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     if excerpt:
         issue = replace(issue, column=column(texts[line], number, a, b, c))
     letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
-    may_slip = line in texts and not (number == f.O_WORD and _O_LINE.match(texts[line]))
+    may_slip = line in texts and not (number == findings.F.O_WORD and _O_LINE.match(texts[line]))
     usual = slip(texts[line], issue.code, letter) if may_slip else None
     return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
 
@@ -126,9 +125,9 @@ def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) 
     message, remedy = issue.message, issue.remedy
     if count > 1:
         others = ", ".join(map(str, lines[1:]))
-        rest = ", …" if count > len(lines) else ""
+        more = ", …" if count > len(lines) else ""
         lines_word = "line" if count == 2 else "lines"
-        message += f"; so do {count - 1} more ({lines_word} {others}{rest})"
+        message += f"; so do {count - 1} more ({lines_word} {others}{more})"
     if state["misfits_other_centre"] == count:
         now, other, how = (
             ("G91.1", "G90.1", "absolute") if abs(row["c"]) == G91_1 else ("G90.1", "G91.1", "relative")
@@ -202,7 +201,7 @@ def _spirals(state: Record, texts: Mapping[int, bytes]) -> Iterator[Issue]:
     remedy = sentences.SPIRAL_REMEDY.format(
         decimals=sentences.decimals_needed(float(state["spiral_unit_mm"]))
     )
-    excerpt = quote(texts[line], f.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
+    excerpt = quote(texts[line], findings.F.ARC_RADIUS_MISMATCH, start, end) if line in texts else ""
     yield Issue("warning", "arc-radius-differs", line, sentence, remedy, excerpt)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints
-from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.o_words import COMMENTS_TO_END, Definition
 
@@ -113,12 +113,12 @@ class MacroFlow:
             case "program":
                 self._program(row, line.number)
             case _:
-                self._fault(row, faults.FAULT_STATEMENT)
+                self._fault(row, findings.PF.FAULT_STATEMENT)
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
         for each in self._open:
-            self._fault(each.row, faults.FAULT_DO_OPEN)
+            self._fault(each.row, findings.PF.FAULT_DO_OPEN)
         self._open.clear()
 
     def _set(self, row: int, kind: int, target: int = -1) -> None:
@@ -135,16 +135,16 @@ class MacroFlow:
     def _begin(self, row: int, number: str, kind: int) -> None:
         self._set(row, kind)
         if number not in _LOOP_NUMBERS:
-            self._fault(row, faults.FAULT_DO_NUMBER)
+            self._fault(row, findings.PF.FAULT_DO_NUMBER)
             return
         if any(each.number == number for each in self._open):
-            self._fault(row, faults.FAULT_DO_OPEN)
+            self._fault(row, findings.PF.FAULT_DO_OPEN)
             return
         self._open.append(_Open(number, row))
 
     def _end(self, row: int, number: str) -> None:
         if not self._open or self._open[-1].number != number:
-            self._fault(row, faults.FAULT_END_ALONE)
+            self._fault(row, findings.PF.FAULT_END_ALONE)
             return
         begin = self._open.pop().row
         self._set(row, tables.KIND_JUMP, self._word(begin))
@@ -158,7 +158,7 @@ class MacroFlow:
         if is_head:
             self._set(row, tables.KIND_NOTHING)
             return
-        self._fault(row, faults.FAULT_NEXT_PROGRAM)
+        self._fault(row, findings.PF.FAULT_NEXT_PROGRAM)
         self.segments.append(self._word(row))
 
     def _is_first(self, row: int) -> bool:

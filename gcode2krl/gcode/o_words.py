@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints
-from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
 
 Label = str
@@ -121,17 +121,17 @@ class Flow:
         """Take the O-line of a row, in the order of the file."""
         self.lines["expression"][row] = self.lines["start"][row] + line.behind
         if line.word == "(":
-            self._fault(row, faults.FAULT_NOT_FIRST)
+            self._fault(row, findings.PF.FAULT_NOT_FIRST)
             self.add_refused(row, is_o_line=True)
             return
         handler = getattr(self, f"_{line.word}", None) if line.word else None
         if handler is None:
             known = line.label or line.word
-            self._unread(row, faults.FAULT_WORD if known else faults.FAULT_LABEL)
+            self._unread(row, findings.PF.FAULT_WORD if known else findings.PF.FAULT_LABEL)
         elif not line.label and line.word != "call":
-            self._unread(row, faults.FAULT_LABEL)
+            self._unread(row, findings.PF.FAULT_LABEL)
         elif not line.ends:
-            self._unread(row, faults.FAULT_BEHIND)
+            self._unread(row, findings.PF.FAULT_BEHIND)
         else:
             handler(row, line.label)
 
@@ -175,7 +175,7 @@ class Flow:
     def _begin(self, row: int, label: Label, word: str, kind: int) -> None:
         self._set(row, kind)
         if label in self._labels[-1]:
-            self._fault(row, faults.FAULT_LABEL_TWICE)
+            self._fault(row, findings.PF.FAULT_LABEL_TWICE)
         self._labels[-1].add(label)
         self._open.append(_Open(label, word, row))
 
@@ -184,13 +184,13 @@ class Flow:
         if self._open and self._open[-1].label == label and self._open[-1].word in words:
             return self._open.pop()
         crossed = any(each.label == label and each.word in words for each in self._open)
-        self._unread(row, faults.FAULT_CROSSED if crossed else faults.FAULT_NO_OPENING)
+        self._unread(row, findings.PF.FAULT_CROSSED if crossed else findings.PF.FAULT_NO_OPENING)
         return None
 
     def _close_all(self, depth: int) -> None:
         for each in self._open[depth:]:
             if self.lines["kind"][each.row] != tables.KIND_FAULT:
-                self._fault(each.row, faults.FAULT_NO_CLOSING)
+                self._fault(each.row, findings.PF.FAULT_NO_CLOSING)
             if each.end_unread:
                 self._lead_to_unread(each)
         del self._open[depth:]
@@ -219,7 +219,7 @@ class Flow:
             return
         self._open.append(found)
         if self.lines["kind"][found.branches[-1]] == tables.KIND_ELSE:
-            self._fault(row, faults.FAULT_NO_OPENING)
+            self._fault(row, findings.PF.FAULT_NO_OPENING)
             return
         self._set(row, kind)
         self.lines["target"][found.branches[-1]] = self._word(row)
@@ -271,13 +271,13 @@ class Flow:
 
     def _break(self, row: int, label: Label) -> None:
         found = self._enclosing(label, "while", "do")
-        self._fault(row, faults.FAULT_NOT_IN_LOOP)  # until the loop ends
+        self._fault(row, findings.PF.FAULT_NOT_IN_LOOP)  # until the loop ends
         if found is not None:
             found.breaks.append(row)
 
     def _continue(self, row: int, label: Label) -> None:
         found = self._enclosing(label, "while", "do")
-        self._fault(row, faults.FAULT_NOT_IN_LOOP)
+        self._fault(row, findings.PF.FAULT_NOT_IN_LOOP)
         if found is not None:
             found.continues.append(row)
 
@@ -290,8 +290,8 @@ class Flow:
     def _sub(self, row: int, label: Label) -> None:
         outer = self._sub_at_hand()
         if outer is not None:
-            self._fault(row, faults.FAULT_NESTED_SUB)
-            self._fault(outer.row, faults.FAULT_NESTED_SUB)
+            self._fault(row, findings.PF.FAULT_NESTED_SUB)
+            self._fault(outer.row, findings.PF.FAULT_NESTED_SUB)
             return
         self._set(row, tables.KIND_SUB)
         self._open.append(_Open(label, "sub", row))
@@ -305,7 +305,7 @@ class Flow:
     def _endsub(self, row: int, label: Label) -> None:
         found = self._sub_at_hand()
         if found is None or found.label != label:
-            self._fault(row, faults.FAULT_NOT_IN_SUB)
+            self._fault(row, findings.PF.FAULT_NOT_IN_SUB)
             return
         self._close_all(self._open.index(found) + 1)
         self._open.pop()
@@ -317,14 +317,14 @@ class Flow:
     def _return(self, row: int, _label: Label) -> None:
         # LinuxCNC leaves the subprogram whatever the label is: that of an if or a loop around it too
         if self._sub_at_hand() is None:
-            self._fault(row, faults.FAULT_NOT_IN_SUB)
+            self._fault(row, findings.PF.FAULT_NOT_IN_SUB)
         else:
             self._set(row, tables.KIND_RETURN)
 
     def _program(self, row: int, label: Label) -> None:
         self._set(row, tables.KIND_PROGRAM_NUMBER)
         if self._sub_at_hand() is not None:
-            self._fault(row, faults.FAULT_NESTED_SUB)
+            self._fault(row, findings.PF.FAULT_NESTED_SUB)
             return
         self._close_all(0)
         self._labels = [set()]

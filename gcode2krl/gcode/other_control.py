@@ -80,8 +80,8 @@ def _read_as(mark: Mark, reread: Reread) -> tuple[str, tuple[Issue, ...]]:
     remaining = _errors(dialect, reread)
     if any(issue.code == _POINTLESS for issue in remaining) and len(mark.control.dialects) > 1:
         calculator = mark.control.dialects[1]
-        beside = _errors(calculator, reread)
-        return calculator, beside or tuple(issue for issue in remaining if issue.code == _POINTLESS)
+        errors = _errors(calculator, reread)
+        return calculator, errors or tuple(issue for issue in remaining if issue.code == _POINTLESS)
     return dialect, remaining
 
 

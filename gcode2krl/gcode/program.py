@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.compiled.core import BYTES, FLOATS, INT, INTS32, core_function
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.gcode import arguments, macro_words
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import findings as f
-from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import findings, macro_words
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
@@ -31,6 +29,85 @@ from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
 from gcode2krl.gcode.words import Scanner, Words
+
+# Calls that give fewer arguments than their subprogram reads, or more.
+#
+# What is read and not given is noted while the program runs (``native/gcode/parameters.c:note_argument``),
+# as a subprogram may ask first; not on a Fanuc, where an argument that is not passed leaves its word out,
+# and macros are written for that. What is given and never read is looked for in the text of the subprogram:
+# a branch that this program does not take may read it.
+
+_COMMENT = re.compile(rb"\([^()]*\)|;.*")
+_PARAMETER = re.compile(rb"#\s*(?P<number>\d[\d \t]*)?(?P<sets>\s*=)?")
+_BEFORE_M98 = re.compile(rb"M\s*0*98(?!\d)", re.IGNORECASE)
+_MACRO_ENDS = re.compile(rb"\s*(?:N\s*\d+\s*)?[O:]\s*\d", re.IGNORECASE)
+_OPENS, _CLOSES = {"if", "while", "repeat"}, {"endif", "endwhile", "endrepeat"}
+_MOST, _MOST_NAMED = 33, 4
+_ALL = (2 << _MOST) - 2
+_LETTERS = dict(
+    zip((1, 2, 3, 7, 8, 9, 11, 4, 5, 6, 13, *range(17, 27)), "ABCDEFHIJKMQRSTUVWXYZ", strict=True)
+)
+"""Letters of G65 by the variable that holds them."""
+
+
+def missing(called: Any, label: Label) -> Issue:
+    """Return the warning of a row of `program_tables.SUBPROGRAM` that reads what is not given."""
+    number, line = int(called["missing"]), int(called["missing_read"])
+    count = int(called["missing_given"]).bit_count()
+    given = f"{count} argument{'' if count == 1 else 's'}"
+    what = f"{_name(label)} is called with {given}, and line {line} reads #{number}, which is 0"
+    remedy = f"give {number} arguments, each in [ ]; or set #{number} in the subprogram"
+    return Issue("warning", "argument-count", int(called["missing_line"]), what, remedy)
+
+
+def too_many(called: Any, unread: int, label: Label, begin_line: int, *, of_fanuc: bool) -> Issue:
+    """Return the warning of a row whose arguments ``unread``, as bits, nothing reads."""
+    numbers = [number for number in range(1, _MOST + 1) if unread >> number & 1]
+    names = [_LETTERS.get(n, f"#{n}") if of_fanuc else f"#{n}" for n in numbers]
+    named = ", ".join(names) if len(names) <= _MOST_NAMED else f"{names[0]} to {names[-1]}"
+    what = f"the call gives {named}, which the subprogram that begins at line {begin_line} never reads"
+    remedy = "leave it out, or check which argument the subprogram takes where"
+    return Issue("warning", "argument-count", int(called["given_line"]), f"{_name(label)}: {what}", remedy)
+
+
+def _name(label: Label) -> str:
+    return f"O{label}" if label.isdigit() else f"O<{label}>"
+
+
+def unread_of(given: int, body: Iterable[bytes], *, of_fanuc: bool) -> int:
+    """Return the bits of ``given`` arguments that no line of a subprogram reads; ``body`` begins with it.
+
+    A parameter that the body sets before it reads it, in no branch and no loop, is no argument.
+    """
+    arguments, assigned, depth = 0, 0, 0
+    for line in body:
+        code = _COMMENT.sub(b"", line)
+        if of_fanuc and _MACRO_ENDS.match(code):
+            break
+        word = "" if of_fanuc or b"o" not in code.lower() else parsed(code).word
+        if word == "endsub":
+            depth = 0
+        depth += (word in _OPENS) - (word in _CLOSES)
+        if _BEFORE_M98.search(code):  # the program that it calls has the same parameters
+            return 0
+        sets = 0
+        for found in _PARAMETER.finditer(code):
+            if found["number"] is None:
+                if code.startswith(b"<", found.end()):
+                    continue
+                return 0  # its number is computed
+            number = int(re.sub(rb"\s", b"", found["number"]))
+            if number > _MOST:
+                continue
+            if found["sets"]:
+                sets |= 1 << number
+            elif not assigned >> number & 1:
+                arguments |= 1 << number
+        assigned |= sets if depth == 0 and not of_fanuc else 0
+        if word == "endsub":
+            break
+    return given & ~arguments & _ALL
+
 
 MOST_BYTES = 256_000_000
 """Largest program with parameters or O-words: its text and its words are in memory as a whole."""
@@ -155,14 +232,14 @@ class Program:
         self._count("main_words", self._ends[0])
 
     def _look_at_o_lines(self, first_row: int, word_of_row: Ints) -> None:
-        flow = Flow(self._lines, word_of_row, _Rows(self._labels))
-        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != f.OK)
+        flow = Flow(self._lines, word_of_row, _LabelRows(self._labels))
+        of_flow = (self._lines["kind"] == tables.KIND_O_WORD) | (self._lines["fault"] != findings.F.OK)
         for row in (first_row + np.flatnonzero(of_flow[first_row:])).tolist():
             start = int(self._lines["start"][row])
             content = self._text[start : self._text.index(b"\n", start)]
             if self._block_delete and content.lstrip(b" \t\r").startswith(b"/"):
                 self._lines["kind"][row] = tables.KIND_NOTHING
-            elif self._lines["fault"][row] != f.OK:
+            elif self._lines["fault"][row] != findings.F.OK:
                 flow.add_refused(row, is_o_line=bool(parsed(content).label))
             else:
                 flow.add(row, parsed(content))
@@ -258,10 +335,10 @@ class Program:
             self._read_file(label)
         found = self._macro(label, file) if self._is_macro else self._definition(label, file, word)
         if found is None:
-            self._report(hands_over, word, f.SUBPROGRAM_MISSING)
+            self._report(hands_over, word, findings.F.SUBPROGRAM_MISSING)
             return
         if self._is_macro and len(self._in_file(label, file)) > 1:
-            self._report(hands_over, word, f.O_WORD, faults.FAULT_SUB_TWICE)
+            self._report(hands_over, word, findings.F.O_WORD, findings.PF.FAULT_SUB_TWICE)
             return
         self._tell_subprograms()
         ready = self._subprograms[self._labels[label]]
@@ -322,17 +399,17 @@ class Program:
         for label, row in self._labels.items():
             called = self._subprograms[row]
             if called["missing"]:
-                yield arguments.missing(called, label)
+                yield missing(called, label)
             if called["given"]:
                 entry = int(called["entry"])
                 head_line, first_line = int(self._line[entry - 1]), int(self._line[entry])
                 file = self._file(first_line)
                 texts = lines[file.name] = lines.get(file.name) or file.text.split(b"\n")
                 body = (texts[k] for k in range(first_line - file.first_line, len(texts)))
-                unread = arguments.unread(int(called["given"]), body, of_fanuc=self._is_macro)
+                unread = unread_of(int(called["given"]), body, of_fanuc=self._is_macro)
                 if unread:
                     begin = head_line if self._file(head_line) is file else first_line
-                    yield arguments.too_many(called, unread, label, begin, of_fanuc=self._is_macro)
+                    yield too_many(called, unread, label, begin, of_fanuc=self._is_macro)
 
     # --- places -----------------------------------------------------------------------------------------
 
@@ -371,7 +448,7 @@ class Program:
         return next((file for file in reversed(self.files) if file.first_line <= line), self.files[0])
 
 
-class _Rows(dict[Label, int]):
+class _LabelRows(dict[Label, int]):
     """The row of every label; a new label gets the next."""
 
     def __init__(self, labels: dict[Label, int]) -> None:

@@ -15,12 +15,10 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.gcode import dialect_marks as d
-from gcode2krl.gcode import machine, tool_table
+from gcode2krl.gcode import findings, machine, tool_table
 from gcode2krl.gcode import vocabulary as v
-from gcode2krl.gcode.chord_tolerance import chord_tolerance_issues
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of, with_cutter
-from gcode2krl.gcode.findings import DIALECT_STATEMENT
 from gcode2krl.gcode.heidenhain import Translator
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
@@ -57,6 +55,33 @@ from gcode2krl.gcode.tool_comments import (
 )
 from gcode2krl.gcode.words import Scanner, Words
 from gcode2krl.tables import Event, Toolpath
+
+# How far chords may be from their arc: which tolerances are plausible, doubtful or refused.
+
+WIDE_MM = 1.0
+"""Assumed: facets this deep are visible on any part."""
+MOST_MM = 10.0
+"""Assumed: arcs of most parts would be one chord."""
+
+
+def chord_tolerance_issues(chord_tolerance_mm: float, source: str) -> Iterator[Issue]:
+    """Yield what is doubtful about a chord tolerance; raise an input error where it is too large."""
+    if chord_tolerance_mm > MOST_MM:
+        raise input_error(
+            "option-value",
+            f"chord tolerance {chord_tolerance_mm:g} mm is more than {MOST_MM:g} mm: arcs would be lost",
+            "0.01 is usual (--chord-tolerance)",
+            source=source,
+        )
+    if chord_tolerance_mm > WIDE_MM:
+        yield Issue(
+            "warning",
+            "chord-tolerance",
+            0,
+            f"chords may be {chord_tolerance_mm:g} mm off their arc",
+            "0.01 is usual (--chord-tolerance)",
+        )
+
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
@@ -444,7 +469,7 @@ class _Interpreter:
         known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
         if self.state["corner"][0]:  # the program has ended before the block that makes it
             line = int(self.state["corner_line"][0])
-            known.append(make_issue(DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
+            known.append(make_issue(findings.F.DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
         found = [self._placed(issue) for issue in known]
         if any(issue.severity == "error" for issue in found):
             raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)

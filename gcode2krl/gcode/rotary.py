@@ -47,7 +47,7 @@ _PLANES = {"A": (1, 2), "B": (2, 0), "C": (0, 1)}
 """Which component each axis turns towards which."""
 
 
-class Part(NamedTuple):
+class TurnedColumns(NamedTuple):
     """What the rotary stage makes of the columns."""
 
     columns: dict[str, NDArray[Any]]
@@ -63,7 +63,7 @@ def in_part(
     chord_tolerance_mm: float,
     vel_ori_deg_s: float,
     source: str,
-) -> Part:
+) -> TurnedColumns:
     """Return columns whose positions are the tip in the part, the tool axis, and events at their new rows.
 
     Parameters
@@ -81,7 +81,7 @@ def in_part(
     rest = {name: column for name, column in columns.items() if name not in ("turn", "turn_mode", "time_s")}
     if not columns["turn"].any():
         upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(columns["turn"]), 3))
-        return Part(rest, upright, events, ())
+        return TurnedColumns(rest, upright, events, ())
     way = _Way(columns, machine, source)
     chords = way.chords(chord_tolerance_mm)
     owner = np.repeat(np.arange(len(chords)), chords)
@@ -99,7 +99,7 @@ def in_part(
     issues = tuple(_turns_on_spot(rest, np.append(0.0, turn_deg), time_s, on_spot, vel_ori_deg_s))
     last = np.cumsum(chords) - 1
     moved = tuple(event._replace(row=int(last[event.row])) for event in events)
-    return Part(rest, axis, moved, issues)
+    return TurnedColumns(rest, axis, moved, issues)
 
 
 def posed(machine: "Machine", stand: Floats, deg: Floats, lift_mm: Floats) -> tuple[Floats, Floats]:

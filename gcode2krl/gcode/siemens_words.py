@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Ints
-from gcode2krl.gcode import program_faults as faults
+from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.o_words import Flow, OLine
 
@@ -142,16 +142,16 @@ class SiemensFlow:
         for row in self._blocks:
             if (
                 self._lines["kind"][row] == tables.KIND_FAULT
-                and self._lines["fault"][row] != faults.FAULT_FOR_END
+                and self._lines["fault"][row] != findings.PF.FAULT_FOR_END
             ):
-                self._lines["fault"][row] = faults.FAULT_STRUCTURE
+                self._lines["fault"][row] = findings.PF.FAULT_STRUCTURE
 
     # --- jumps ------------------------------------------------------------------------------------------
 
     def _jump(self, row: int, found: re.Match[bytes]) -> None:
         target = self._target(found["target"].upper(), found["way"].upper(), int(self._word_of_row[row]))
         if target is None:
-            self._fault(row, faults.FAULT_NO_LABEL)
+            self._fault(row, findings.PF.FAULT_NO_LABEL)
             return
         self._lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
         self._lines["target"][row] = target
@@ -179,7 +179,7 @@ class SiemensFlow:
             self._open.append((word, row))
             self._flow.add(row, OLine(f"{row}", _OPENS[word], behind, alone))
         elif not self._open or self._open[-1][0] != _OPENED_BY[word]:
-            self._fault(row, faults.FAULT_STRUCTURE)
+            self._fault(row, findings.PF.FAULT_STRUCTURE)
             self._flow.add_refused(row, is_o_line=True)
             return
         else:
@@ -205,7 +205,7 @@ class SiemensFlow:
             lines["target"][row] += 1
             lines["expression"][row] = lines["expression"][begin]
             if self._sets_its_end(self._line_of(begin), self._line_of(row)):
-                self._fault(begin, faults.FAULT_FOR_END)
+                self._fault(begin, findings.PF.FAULT_FOR_END)
 
     def _line_of(self, row: int) -> int:
         return int(self._line_of_word[self._word_of_row[row]]) - self._first_line
@@ -226,7 +226,7 @@ class SiemensFlow:
         begin = self._only(found["first"])
         last = begin if found["one"] else self._only(found["last"]) if found["last"] else None
         if begin is None or (found["last"] and last is None):
-            self._fault(row, faults.FAULT_SECTION_LABEL)
+            self._fault(row, findings.PF.FAULT_SECTION_LABEL)
             return
         if last is not None:
             until = self._behind(last)
@@ -234,7 +234,7 @@ class SiemensFlow:
             ends = [word for word in self._words.get(b"ENDLABEL", []) if word > begin]
             until = ends[0] if ends and not begin < here < ends[0] else here
         if until <= begin or begin <= here < until:
-            self._fault(row, faults.FAULT_SECTION_LABEL)
+            self._fault(row, findings.PF.FAULT_SECTION_LABEL)
             return
         lines = self._lines
         lines["kind"][row], lines["target"][row], lines["end"][row] = tables.KIND_SECTION, begin, until

@@ -91,11 +91,11 @@ def _said(comment: str) -> tuple[int | None, float, str] | None:
     if _OTHER.search(comment):
         return None
     for pattern in _DIAMETER:
-        found = pattern.search(comment)
-        if found is not None:
+        match = pattern.search(comment)
+        if match is not None:
             tool = _TOOL.search(comment)
-            unit = (found[2] or "").replace('"', "IN")[:2]
-            return int(tool[1]) if tool else None, _value(found[1]), {"MM": "mm", "IN": "inch"}.get(unit, "")
+            unit = (match[2] or "").replace('"', "IN")[:2]
+            return int(tool[1]) if tool else None, _value(match[1]), {"MM": "mm", "IN": "inch"}.get(unit, "")
     return None
 
 

@@ -90,8 +90,8 @@ def _nearest_share(ratio: Floats, cos_turn: Floats) -> Floats:
     bend = ratio * cos_turn
     for _ in range(_HALVINGS):
         t = (low + high) / 2.0
-        rest = 1.0 - t
-        beyond = t**3 - ratio**2 * rest**3 > bend * t * rest * (rest - t)
+        remaining = 1.0 - t
+        beyond = t**3 - ratio**2 * remaining**3 > bend * t * remaining * (remaining - t)
         low, high = np.where(beyond, low, t), np.where(beyond, t, high)
     return (low + high) / 2.0
 

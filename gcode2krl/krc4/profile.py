@@ -69,8 +69,8 @@ def plan_profile(
     averages : the law; False = trapezoid.
     """
     if len(length_mm) == 0:
-        rest = np.zeros(1)
-        return Profile(rest, rest, rest, rest, rest, np.zeros(0), 0.0)
+        standstill = np.zeros(1)
+        return Profile(standstill, standstill, standstill, standstill, standstill, np.zeros(0), 0.0)
     length_mm, speed_mm_s, blend_mm, wait_s = map(contiguous, (length_mm, speed_mm_s, blend_mm, wait_s))
     acceleration = np.ascontiguousarray(np.broadcast_to(np.asarray(a_mm_s2, dtype=float), length_mm.shape))
     bound = np.empty(len(length_mm) + 1)

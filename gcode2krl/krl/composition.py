@@ -69,7 +69,7 @@ class _Part(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """How the text is laid out; what the header must say of the options."""
 
     guard: bool = True
@@ -95,7 +95,7 @@ def compose(
     joints: Joints,
     cell: Cell,
     name: str,
-    layout: Layout,
+    layout: TextLayout,
     pilot: PilotText | None = None,
 ) -> dict[str, Iterable[bytes]]:
     """Return file name → text of the program ``name``, in pieces that are made as they are asked for.
@@ -114,7 +114,7 @@ class _Composer:
         joints: Joints,
         cell: Cell,
         name: str,
-        layout: Layout,
+        layout: TextLayout,
         pilot: PilotText | None,
     ) -> None:
         self.targets, self.joints, self.cell, self.name, self.layout = targets, joints, cell, name, layout
@@ -281,12 +281,12 @@ class _Composer:
         """
         chunks: list[tuple[int, int, bool]] = []
         start, count = 0, len(self.targets)
-        apart = np.array(self.targets.ptp)
+        is_alone = np.array(self.targets.ptp)
         if self.rsi is not None:
-            apart[self.rsi.off] = True
-        borders = np.append(np.flatnonzero(apart), count)
+            is_alone[self.rsi.off] = True
+        borders = np.append(np.flatnonzero(is_alone), count)
         while start < count:
-            if apart[start]:
+            if is_alone[start]:
                 chunks.append((start, start + 1, False))
                 start += 1
                 continue

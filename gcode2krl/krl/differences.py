@@ -67,7 +67,7 @@ class Differences:
     issues: tuple[Issue, ...]
 
 
-class _Rows(NamedTuple):
+class _MotionValues(NamedTuple):
     """Rows of motions, and a number of each."""
 
     row: Ints
@@ -120,13 +120,13 @@ class _Noted(NamedTuple):
         sizes = np.empty(_MOST_WORST), np.empty(_MOST_WORST)
         return cls(np.zeros(3), counts[0], rows[0], np.empty(places), counts[1], rows[1], *sizes)
 
-    def wrong(self, check: int) -> _Rows:
+    def wrong(self, check: int) -> _MotionValues:
         taken = slice(0, int(self.taken[check]))
-        return _Rows(self.row[check, taken], self.size[check, taken])
+        return _MotionValues(self.row[check, taken], self.size[check, taken])
 
-    def furthest(self) -> _Rows:
+    def furthest(self) -> _MotionValues:
         taken = slice(0, int(self.worst_count[0]))
-        return _Rows(self.worst[taken], self.worst_size[taken])
+        return _MotionValues(self.worst[taken], self.worst_size[taken])
 
 
 READ, WANTED = StructOf.record(_Read), StructOf.record(_Wanted)
@@ -168,16 +168,16 @@ def _angles_deg(read: _Read, wanted: _Wanted, rows: Ints, cell: Cell) -> Floats:
     """Return the angles (r,) in deg between read and intended rotations; NaN where A, B or C is missing."""
     abc_deg, angle_deg = read.pose[rows, 3:6], np.empty(len(rows))
     for number in distinct(wanted.tool[rows]):
-        own = np.flatnonzero(wanted.tool[rows] == number)
+        of_tool = np.flatnonzero(wanted.tool[rows] == number)
         turn = controller_axes(cell.tool[int(number)].axis or "+z")[:3, :3]
-        found = fr.rotation_from_abc(np.nan_to_num(abc_deg[own]) * RAD_PER_DEG) @ turn
-        angle = fr.angle_between(fr.quaternion_from_rotation(found), wanted.rotation[rows[own]])
-        angle_deg[own] = angle * DEG_PER_RAD
+        rotation = fr.rotation_from_abc(np.nan_to_num(abc_deg[of_tool]) * RAD_PER_DEG) @ turn
+        angle = fr.angle_between(fr.quaternion_from_rotation(rotation), wanted.rotation[rows[of_tool]])
+        angle_deg[of_tool] = angle * DEG_PER_RAD
     angle_deg[np.isnan(abc_deg).any(axis=1)] = np.nan
     return angle_deg
 
 
-def _other_branches(program: KrlProgram, targets: Targets, joints: Joints, count: int) -> _Rows:
+def _other_branches(program: KrlProgram, targets: Targets, joints: Joints, count: int) -> _MotionValues:
     """Return the first PTP motions whose S or T is another one than that of the joints."""
     rows = np.flatnonzero(targets.ptp[:count] & ~targets.home[:count])
     other = [
@@ -185,31 +185,31 @@ def _other_branches(program: KrlProgram, targets: Targets, joints: Joints, count
         for row in rows.tolist()
         if (program.status_turn[row] != (joints.status[row], turn_bits(joints.q_rad[row]))).any()
     ]
-    return _Rows(np.array(other[:MOST_PLACES], dtype=np.int64), np.zeros(len(other[:MOST_PLACES])))
+    return _MotionValues(np.array(other[:MOST_PLACES], dtype=np.int64), np.zeros(len(other[:MOST_PLACES])))
 
 
-def _external_off(program: KrlProgram, targets: Targets, cell: Cell, count: int) -> _Rows:
+def _external_off(program: KrlProgram, targets: Targets, cell: Cell, count: int) -> _MotionValues:
     """Return the first motions whose external axes stand elsewhere, NaN where one of the cell is missing."""
     if not cell.external:
-        return _Rows(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return _MotionValues(np.zeros(0, dtype=np.int64), np.zeros(0))
     axes = [w.EXTERNAL_KEYS.index(name) for name in sorted(cell.external)]
     off = np.abs(program.external[:count, axes] - targets.external[:count, axes]).max(axis=1)
     rows = np.flatnonzero(~(off <= EXTERNAL_LIMIT))[:MOST_PLACES]
-    return _Rows(rows, off[rows])
+    return _MotionValues(rows, off[rows])
 
 
-def _furthest(found: _Rows) -> _Rows:
+def _furthest(found: _MotionValues) -> _MotionValues:
     order = np.argsort(-np.nan_to_num(found.value, nan=np.inf), kind="stable")[:_MOST_WORST]
-    return _Rows(found.row[order], found.value[order])
+    return _MotionValues(found.row[order], found.value[order])
 
 
-def _joined(parts: list[_Rows]) -> _Rows:
+def _joined(parts: list[_MotionValues]) -> _MotionValues:
     if not parts:
-        return _Rows(np.zeros(0, dtype=np.int64), np.zeros(0))
-    return _Rows(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+        return _MotionValues(np.zeros(0, dtype=np.int64), np.zeros(0))
+    return _MotionValues(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def _issues(program: KrlProgram, targets: Targets, wrong: list[_Rows]) -> Iterator[Issue]:
+def _issues(program: KrlProgram, targets: Targets, wrong: list[_MotionValues]) -> Iterator[Issue]:
     for (code, sentence), found in zip(_CHECKS, wrong, strict=True):
         for row, amount in list(zip(*found, strict=True))[:MOST_PLACES]:
             gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""

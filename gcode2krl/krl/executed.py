@@ -11,7 +11,7 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.krl.scan import Scanned
 
 
-class Block(NamedTuple):
+class StatementRun(NamedTuple):
     """A run of statements of a file: its number, the first statement and the one behind the last."""
 
     file: int
@@ -54,12 +54,12 @@ class Executed(NamedTuple):
         return np.repeat(self.files, np.diff(self.motions_before(self.begins)))
 
 
-def executed_in(runs: Sequence[Block], scanned: Sequence[Scanned], others: Sequence[Ints]) -> Executed:
+def executed_in(runs: Sequence[StatementRun], scanned: Sequence[Scanned], others: Sequence[Ints]) -> Executed:
     """Return the statements of runs; rows that stand together in a file are views of what was scanned.
 
     ``others`` are the statements of each file that are no motion.
     """
-    runs = [run for run in runs if run.end > run.start] or [Block(0, 0, 0)]
+    runs = [run for run in runs if run.end > run.start] or [StatementRun(0, 0, 0)]
     files, statements = [run.file for run in runs], [(run.start, run.end) for run in runs]
     places = [np.searchsorted(others[run.file], (run.start, run.end)).tolist() for run in runs]
     no_motions = [(first, behind) for first, behind in places]

@@ -71,8 +71,8 @@ def motion_lines(
 
     def write(start: int, end: int) -> bytes:
         part = slice(start, end)
-        own = text[begins[start] : begins[end]] if len(text) else text
-        buffer = _room(BYTES_PER_TARGET * (end - start) + len(own))
+        chunk = text[begins[start] : begins[end]] if len(text) else text
+        buffer = _room(BYTES_PER_TARGET * (end - start) + len(chunk))
         size = _lines(
             position[part],
             abc[part],
@@ -83,7 +83,7 @@ def motion_lines(
             axes,
             in_force[start],
             comment_every,
-            own,
+            chunk,
             begins[start : end + 1] - begins[start] if len(text) else begins,
             buffer,
         )

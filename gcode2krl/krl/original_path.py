@@ -226,10 +226,10 @@ class _Walk:
         path = self.toolpath
         moving = ends | (lengths(path.position_mm[row] - path.position_mm[row - 1]) > _WRITTEN_MM)
         feed = np.where(path.rapid[row], self.cell.controller.rapid_m_s * MM_PER_M, path.feed_mm_s[row])
-        found = self.program.speed_mm_s[self.end[of]]
-        wrong = moving & ~self.program.ptp[self.end[of]] & ~(np.abs(found - feed) <= SPEED_LIMIT_MM_S)
+        speed_mm_s = self.program.speed_mm_s[self.end[of]]
+        wrong = moving & ~self.program.ptp[self.end[of]] & ~(np.abs(speed_mm_s - feed) <= SPEED_LIMIT_MM_S)
         for at in np.flatnonzero(wrong):
-            text = f"speed {found[at]:.3f} mm/s, {feed[at]:.3f} in the G-code"
+            text = f"speed {speed_mm_s[at]:.3f} mm/s, {feed[at]:.3f} in the G-code"
             yield self._issue(self.end[of[at]], row[at], text)
 
     def _pieces(self, linked: Bools, start: Floats, unit: Floats, length: Floats) -> Iterator[Issue]:
@@ -275,11 +275,11 @@ class _Walk:
             rows.setdefault(_key(event), []).append(event.row)
         earlier = -1
         for event in self.targets.events:
-            left = rows.get(_key(event))
-            if not left:
+            waiting = rows.get(_key(event))
+            if not waiting:
                 yield self._issue(event.row, 0, f"{event.kind} is switched once more than in the G-code")
                 continue
-            row = left.pop()
+            row = waiting.pop()
             k = int(np.searchsorted(self.claim, row, side="right")) - 1
             low = int(self.end[k]) if k >= 0 else 0
             high = int(self.end[k + 1]) if k + 1 < len(self.end) else len(self.targets)
@@ -287,8 +287,8 @@ class _Walk:
             if not (moves or low <= event.row < high or event.row == earlier):
                 yield self._issue(event.row, row, f"{event.kind} is switched at another place")
             earlier = event.row
-        for (kind, _), left in rows.items():
-            yield from (self._issue(0, row, f"{kind} is not switched") for row in left)
+        for (kind, _), waiting in rows.items():
+            yield from (self._issue(0, row, f"{kind} is not switched") for row in waiting)
         dwell_s, wait_s = float(self.toolpath.dwell_s.sum()), float(self.program.wait_s.sum())
         if abs(dwell_s - wait_s) > WAIT_LIMIT_S * max(1, int(np.count_nonzero(self.targets.wait_s))):
             yield self._issue(0, 0, f"dwells of {wait_s:.3f} s, {dwell_s:.3f} s in the G-code")

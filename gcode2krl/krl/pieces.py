@@ -42,9 +42,9 @@ def split(targets: Targets, joints: Joints, pieces: Pieces, cell: Cell) -> tuple
     """
     count = np.bincount(pieces.row, minlength=len(targets)) + 1
     order = np.repeat(np.arange(len(targets)), count)
-    own = np.cumsum(count) - 1
+    last = np.cumsum(count) - 1
     new = np.ones(len(order), dtype=np.bool_)
-    new[own] = False
+    new[last] = False
     start, from_rotation = (column[pieces.row] for column in motion_starts(targets, cell))
     way = targets.position_mm[pieces.row] - start
     rows = _taken(targets, order)
@@ -54,8 +54,8 @@ def split(targets: Targets, joints: Joints, pieces: Pieces, cell: Cell) -> tuple
         begins = external_starts(targets)[pieces.row]
         rows["external"][new] = begins + pieces.share[:, None] * (targets.external[pieces.row] - begins)
     rows["cdis_mm"][new], rows["wait_s"][new], rows["move"][new] = pieces.cdis_mm, 0.0, -1
-    events = tuple(event._replace(row=int(own[event.row])) for event in targets.events)
-    return replace(targets, events=events, **rows), replace(joints, **_taken(joints, order)), own
+    events = tuple(event._replace(row=int(last[event.row])) for event in targets.events)
+    return replace(targets, events=events, **rows), replace(joints, **_taken(joints, order)), last
 
 
 def _taken(table: Table, rows: Rows) -> dict[str, Any]:

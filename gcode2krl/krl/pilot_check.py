@@ -106,8 +106,8 @@ def _checksum_issues(program: KrlProgram, pilot: PilotText) -> list[Issue]:
     """Check that the program and its sidecar state the checksum of what was read, before any motion."""
     right = checksum_of(program, pilot.rows)
     set_to = re.compile(re.escape(pilot.hash_variable) + r"=(\d+)", re.IGNORECASE)
-    found = [(set_to.fullmatch(re.sub(r"\s+", "", s.text)), s) for s in program.statements]
-    stated = [(int(match[1]), s) for match, s in found if match]
+    matches = [(set_to.fullmatch(re.sub(r"\s+", "", s.text)), s) for s in program.statements]
+    stated = [(int(match[1]), s) for match, s in matches if match]
     issues = []
     if len(stated) != 1 or stated[0][1].motion > 0 or stated[0][0] != right:
         line = stated[0][1].line if stated else program.def_line

@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.krl.announce import Form, Layout, PilotPlan, Planner
+from gcode2krl.krl.announce import Form, PilotPlan, Planner, TimedMotions
 from gcode2krl.pilot import Knots
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.tables import Joints
@@ -83,7 +83,7 @@ def _shortened(plan: Planner, knots: Knots, why: Issue) -> PilotPlan | Issue:
     return why
 
 
-def _most_in_time(plan: Planner, knots: Knots, layout: Layout) -> int:
+def _most_in_time(plan: Planner, knots: Knots, layout: TimedMotions) -> int:
     """Return how many of the first knots can be announced, by bisection.
 
     Triggers of later knots push those of earlier ones, so a shorter pilot force is never harder to announce.

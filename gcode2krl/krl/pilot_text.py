@@ -48,13 +48,15 @@ class PilotText:
         first, behind = self._triggers_of(start, end)
         if first == behind or self.triggers is None:
             return NOTHING_BEFORE
-        own = slice(first, behind)
+        written = slice(first, behind)
         lines = [
             f"{w.TRIGGER} {w.WHEN} {w.DISTANCE}=0 {w.DELAY}={delay} {w.DO} {action}\r\n"
-            for delay, action in zip(self.triggers.delay_ms[own].tolist(), self._actions(own), strict=True)
+            for delay, action in zip(
+                self.triggers.delay_ms[written].tolist(), self._actions(written), strict=True
+            )
         ]
         size = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
-        begins = size[np.searchsorted(self.triggers.row[own], np.arange(start, end + 1))]
+        begins = size[np.searchsorted(self.triggers.row[written], np.arange(start, end + 1))]
         return np.frombuffer("".join(lines).encode("ascii"), dtype=np.uint8), begins
 
     def calls_in(self, start: int, end: int) -> bool:
@@ -78,11 +80,11 @@ class PilotText:
             return [*(f"{self.header.variable}={knot}" for knot in known), *end]
         columns = [*self.knots.force_N[rows].T.tolist(), self.knots.lead_s[rows].tolist()]
         n, s = FORCE_DECIMALS, LEAD_DECIMALS
-        told = [
+        lines = [
             f"{w.PILOT_SUBPROGRAM}({x:.{n}f},{y:.{n}f},{z:.{n}f},{lead_s:.{s}f}) {_PRIO}"
             for x, y, z, lead_s in zip(*columns, strict=True)
         ]
-        return [*told, *end]
+        return [*lines, *end]
 
     def _no_knot(self) -> str:
         """Return what puts the receiver back to where it was before the first knot: it knows no force."""

@@ -47,17 +47,17 @@ def unconfirmed_lines(cell: Cell) -> list[str]:
 def _defaults(cell: Cell, tools: list[int], pilot: bool, online: bool) -> Iterator[str]:
     values = default_values(cell)
     for key, value in values.items():
-        section, _, rest = key.partition(".")
+        section, _, name = key.partition(".")
         if (section, False) in (("pilot", pilot), ("online", online)) or key in _WITHOUT_WORD:
             continue
-        if section != "tool" or int(rest.split(".")[0]) in tools:
+        if section != "tool" or int(name.split(".")[0]) in tools:
             yield f"{key} = {_comment(value)}"
 
 
 def default_values(cell: Cell) -> dict[str, str]:
     """Return key → value of the documented defaults that nobody stated; what is empty or off is left out."""
     record = cell.model_dump(mode="json")
-    found = {}
+    hashes = {}
     for key in cell.defaults:
         value: Any = record
         for step in key.split("."):
@@ -66,8 +66,8 @@ def default_values(cell: Cell) -> dict[str, str]:
             value = "+z"
         whose = " (library)" if key.endswith(".length_mm") else ""
         if value not in ("", [], None) and value is not False:
-            found[key] = f"{value}{whose}"
-    return found
+            hashes[key] = f"{value}{whose}"
+    return hashes
 
 
 def _comment(value: str) -> str:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,12 +13,60 @@ from numpy.typing import NDArray
 
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.core import (
+    BYTES,
+    FLOATS,
+    INTS32,
+    OUT_BOOLS,
+    OUT_FLOATS,
+    OUT_INTS,
+    OUT_INTS32,
+    core_function,
+)
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, input_error
 from gcode2krl.krl import scan as sc
-from gcode2krl.krl.columns import motion_columns
 from gcode2krl.krl.controller_state import may_disturb
-from gcode2krl.krl.executed import Block, Executed, executed_in, is_motion
+from gcode2krl.krl.executed import Executed, StatementRun, executed_in, is_motion
+
+# Statements in the order of execution to columns of motions: speed and approximation in force, line.
+
+_pass = core_function("krl_pass", BYTES, FLOATS, OUT_FLOATS, OUT_INTS)
+_motions = core_function(
+    "krl_motions", BYTES, BYTES, INTS32, FLOATS, FLOATS, OUT_BOOLS, OUT_FLOATS, OUT_FLOATS, OUT_INTS32
+)
+
+
+def motion_columns(
+    kind: NDArray[np.int8], blend: NDArray[np.int8], line: Ints32, number: Floats
+) -> tuple[Bools, Floats, Floats, Ints32]:
+    """Return PTP, speed in mm/s, approximation in mm and line (p,) of the motions among statements (k,).
+
+    ``number`` (k - p,) is the first number of each statement that is no motion. Speed and approximation are
+    those of the last setting that has one, NaN before the first and behind `KIND_FORGETS`; the speed of a PTP
+    is NaN, the approximation of a motion without ``C_DIS`` is 0.
+    """
+    kinds, blends = kind.view(np.uint8), blend.view(np.uint8)
+    borders = chunk_borders(len(kind))
+    in_force, counts = np.full(2, np.nan), np.zeros(2, dtype=np.int64)
+    before = {0: (in_force.copy(), (0, 0))}
+    for start, end in pairwise(borders):
+        _pass(kinds[start:end], number, in_force, counts)
+        before[end] = in_force.copy(), (int(counts[0]), int(counts[1]))
+    count = before[borders[-1]][1][0]
+    ptp, motion_line = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.int32)
+    speed_mm_s, cdis_mm = np.empty((2, count))
+
+    def part(start: int, end: int) -> None:
+        (settings, (motion, other)), (_, (last_motion, last_other)) = before[start], before[end]
+        rows, motions = slice(start, end), slice(motion, last_motion)
+        columns = ptp[motions], speed_mm_s[motions], cdis_mm[motions], motion_line[motions]
+        _motions(kinds[rows], blends[rows], line[rows], number[other:last_other], settings, *columns)
+
+    in_chunks(part, borders)
+    return ptp, speed_mm_s, cdis_mm, motion_line
+
 
 _DEF = re.compile(rf"(?:{w.GLOBAL}\s+)?{w.DEF}\s+([A-Z_$][A-Z0-9_$]*)\s*\(([^)]*)\)\s*$", re.IGNORECASE)
 _CALL = re.compile(r"([A-Z_][A-Z0-9_]*)\s*\(\s*\)\s*$", re.IGNORECASE)
@@ -127,9 +176,9 @@ def read_krl(path: str | Path) -> KrlProgram:
     """
     main = Path(path)
     texts = {main.name: _text_in(main)}
-    beside = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
+    neighbours = {file.stem.upper(): file for file in main.parent.glob("*.[sS][rR][cC]")}
     for name in _externals(texts[main.name]):
-        file = beside.get(name.upper())
+        file = neighbours.get(name.upper())
         if file is not None and file.name not in texts:
             texts[file.name] = _text_in(file)
     return read_texts(texts, main.name)
@@ -147,9 +196,9 @@ def _externals(text: bytes) -> Iterator[str]:
     upper = text.upper()
     at = upper.find(_EXT)
     while at >= 0:
-        found = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
-        if found:
-            yield found[1].decode("ascii")
+        external = _EXTERNAL.match(text, upper.rfind(b"\n", 0, at) + 1)
+        if external:
+            yield external[1].decode("ascii")
         line_end = upper.find(b"\n", at)
         at = upper.find(_EXT, line_end) if line_end >= 0 else -1
 
@@ -170,7 +219,7 @@ class _Reader:
         self.others = [np.flatnonzero(~is_motion(scanned.kind)) for scanned in self.scanned]
         self.line_starts: dict[int, Ints] = {}
         self.issues: list[Issue] = []
-        self.blocks: dict[tuple[int, str], Block] = {}
+        self.blocks: dict[tuple[int, str], StatementRun] = {}
         self.executed: set[tuple[int, str]] = set()
         self.declarations: list[Statement] = []
         self.def_lines: dict[str, int] = {}
@@ -259,11 +308,11 @@ class _Reader:
         return kind
 
     def _triggers(self, executed: Executed) -> ReadTriggers:
-        own = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
-        rows, values = executed.others[own], executed.value[own]
+        triggers = np.flatnonzero(executed.kind[executed.others] == w.KIND_TRIGGER)
+        rows, values = executed.others[triggers], executed.value[triggers]
         file_of = executed.places(rows)[0]
         return ReadTriggers(
-            motion=rows - own,
+            motion=rows - triggers,
             distance=values[:, w.TRIGGER_DISTANCE],
             delay_ms=values[:, w.TRIGGER_DELAY],
             written=values[:, w.TRIGGER_WRITTEN : w.TRIGGER_WRITTEN + w.TRIGGER_NUMBERS],
@@ -281,17 +330,17 @@ class _Reader:
 
     def _names_written(self, place: Ints, file_of: Ints32) -> tuple[str, ...]:
         """Return the names that stand at first bytes and lengths (k, 2), each once."""
-        found: set[str] = set()
+        names: set[str] = set()
         for file in distinct(file_of).tolist():
             data = self.texts[self.names[file]]
             own = place[file_of == file]
             for size in distinct(own[:, 1]).tolist():
                 first = own[own[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
-                found |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
-        return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in found}))
+                names |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
+        return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in names}))
 
-    def _texts_of(self, block: Block) -> tuple[str, ...]:
+    def _texts_of(self, block: StatementRun) -> tuple[str, ...]:
         rows = range(block.start, block.end)
         return tuple(re.sub(r"\s+", "", self._statement(block.file, row)).upper() for row in rows)
 
@@ -325,11 +374,11 @@ class _Reader:
         name, start = "", 0
         for row in np.flatnonzero(scanned.kind == w.KIND_OTHER):
             text = self._statement(file, int(row))
-            found = _DEF.match(text)
-            if found:
+            match = _DEF.match(text)
+            if match:
                 if name:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} has no END", file)
-                name, start = found.group(1).upper(), int(row) + 1
+                name, start = match.group(1).upper(), int(row) + 1
                 self.def_lines.setdefault(name, int(scanned.line[row]))
             elif text.upper() == w.END:
                 if not name:
@@ -337,11 +386,11 @@ class _Reader:
                     continue
                 if (file, name) in self.blocks:
                     self._issue("krl-structure", int(scanned.line[row]), f"DEF {name} stands twice", file)
-                self.blocks.setdefault((file, name), Block(file, start, int(row)))
+                self.blocks.setdefault((file, name), StatementRun(file, start, int(row)))
                 name = ""
         if name:
             self._issue("krl-structure", int(scanned.line[-1]), f"DEF {name} has no END", file)
-            self.blocks.setdefault((file, name), Block(file, start, len(scanned.kind)))
+            self.blocks.setdefault((file, name), StatementRun(file, start, len(scanned.kind)))
 
     def _called(self, file: int, name: str) -> tuple[int, str] | None:
         """Return the subprogram that a file means by a name: its own, else the one a file is named after."""
@@ -351,7 +400,7 @@ class _Reader:
         others = (k for k, other in enumerate(self.names) if Path(other).stem.upper() == name)
         return next(((k, name) for k in others if (k, name) in self.blocks), None)
 
-    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[Block]:
+    def _execute(self, block: tuple[int, str], depth: int) -> Iterator[StatementRun]:
         """Yield the runs of statements in the order of execution; calls of known subprograms are followed."""
         self.executed.add(block)
         file, start, end = self.blocks[block]
@@ -367,16 +416,16 @@ class _Reader:
                     self._issue(
                         "krl-structure", int(scanned.line[row]), f"{text[:40]!r} behind statements", file
                     )
-                yield Block(file, at, int(row))
+                yield StatementRun(file, at, int(row))
                 at = int(row) + 1
             elif call and (called := self._called(file, call.group(1))):
-                yield Block(file, at, int(row))
+                yield StatementRun(file, at, int(row))
                 at = int(row) + 1
                 if depth > 20:
                     self._issue("krl-structure", int(scanned.line[row]), "calls nest too deeply", file)
                     return
                 yield from self._execute(called, depth + 1)
-        yield Block(file, at, end)
+        yield StatementRun(file, at, end)
 
     def _last_declaration(self, file: int, start: int, end: int) -> int:
         """Return the last row of the run of declarations with which a block begins."""

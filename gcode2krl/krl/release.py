@@ -62,18 +62,18 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
     NotUnderstoodError
         Where a release has no such form, matches nothing, or may not be given.
     """
-    found = _as_written(issues)
-    findings = list(found)
+    as_written = _as_written(issues)
+    findings = list(as_written)
     for word in allow:
-        matches = _matches(found, word)
+        matches = _matches(as_written, word)
         if not matches:
             raise input_error("allow", f"--allow {word}: no such finding", _REMEDY)
-        first = found[matches[0]]
+        first = as_written[matches[0]]
         if first.code in NEVER_RELEASED:
             raise input_error("allow", f"--allow {word}: {first.code} cannot be released", first.remedy)
         for k in matches:
-            message = f"{found[k].message} (released by hand)"
-            findings[k] = replace(found[k], severity="warning", message=message)
+            message = f"{as_written[k].message} (released by hand)"
+            findings[k] = replace(as_written[k], severity="warning", message=message)
     refusing = ("error", "warning") if strict else ("error",)
     if any(issue.severity in refusing for issue in findings):
         raise RefusedError(sorted(findings, key=lambda issue: (issue.severity != "error", issue.line)))
@@ -82,8 +82,8 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
 
 def matching(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:
     """Return the releases that match an error so far; later stages may find what the others mean."""
-    found = _as_written(issues)
-    return tuple(word for word in allow if _matches(found, word))
+    as_written = _as_written(issues)
+    return tuple(word for word in allow if _matches(as_written, word))
 
 
 def is_refusing(issues: Iterable[Issue], allow: Iterable[str]) -> bool:
@@ -99,13 +99,13 @@ def released_again(issues: Iterable[Issue], releases: Mapping[str, int | None]) 
     ``releases`` says for how many findings each was given, None for any number: where there are more now, a
     person has not seen them all, and none is released.
     """
-    found = _as_written(issues)
-    findings = list(found)
+    as_written = _as_written(issues)
+    findings = list(as_written)
     for word, count in releases.items():
-        matches = _matches(found, word)
+        matches = _matches(as_written, word)
         too_many = count is not None and len(matches) > count
         for k in matches:
-            if found[k].code in NEVER_RELEASED:
+            if as_written[k].code in NEVER_RELEASED:
                 continue
             words = (
                 f"released by hand were {count}, now there are {len(matches)}"
@@ -113,15 +113,17 @@ def released_again(issues: Iterable[Issue], releases: Mapping[str, int | None]) 
                 else "released by hand"
             )
             severity: Severity = "error" if too_many else "warning"
-            findings[k] = replace(found[k], severity=severity, message=f"{found[k].message} ({words})")
+            findings[k] = replace(
+                as_written[k], severity=severity, message=f"{as_written[k].message} ({words})"
+            )
     return findings
 
 
 def header_words(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:
     """Return what the program's header says of releases: those of a whole file with their number."""
-    found = _as_written(issues)
+    as_written = _as_written(issues)
     return tuple(
-        word if ":" in word else f"{word} (whole file, {len(_matches(found, word))})" for word in allow
+        word if ":" in word else f"{word} (whole file, {len(_matches(as_written, word))})" for word in allow
     )
 
 
@@ -142,13 +144,13 @@ def _matches(findings: Sequence[Issue], word: str) -> list[int]:
 
 def _places(issue: Issue) -> tuple[Place, ...]:
     """Return how a release may name the place of a finding."""
-    own = ("", issue.line)
-    return ((PurePath(issue.file).name, issue.file_line), own) if issue.file else (own,)
+    key = ("", issue.line)
+    return ((PurePath(issue.file).name, issue.file_line), key) if issue.file else (key,)
 
 
 def _parse(word: str) -> tuple[str, Place | None]:
     """Return code and place of a release; none means everywhere."""
-    found = _RELEASE.fullmatch(word)
-    if found is None:
+    match = _RELEASE.fullmatch(word)
+    if match is None:
         raise input_error("allow", f"--allow {word}: not of the form CODE:LINE or CODE", _REMEDY)
-    return found["code"], None if found["line"] is None else (found["file"] or "", int(found["line"]))
+    return match["code"], None if match["line"] is None else (match["file"] or "", int(match["line"]))

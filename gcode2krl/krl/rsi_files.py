@@ -256,24 +256,24 @@ def _sources(settings: Online, pilot: Pilot, form: Form) -> list[_Object]:
         return _Object(kind, number, f"{kind}{name}", parameters=(("Index", 1, index, True),))
 
     bit = (("Index", 1, settings.link.t1_output, True), ("DataSize", 2, 0, True))
-    found = [_Object("OV_PRO", 63, "OV_PRO1"), _Object("DIGOUT", 43, "DIGOUT1", parameters=bit)]
+    objects = [_Object("OV_PRO", 63, "OV_PRO1"), _Object("DIGOUT", 43, "DIGOUT1", parameters=bit)]
     if form == "index":
-        found.append(numbered("SEN_PINT", 57, 1, _index(pilot.index_variable, _INTEGER)))
+        objects.append(numbered("SEN_PINT", 57, 1, _index(pilot.index_variable, _INTEGER)))
     if form == "values":
         _index(pilot.value_variable, _REAL)
-        found += [numbered("SEN_PREA", 58, k, k) for k in (1, 2, 3, 4)]
+        objects += [numbered("SEN_PREA", 58, k, k) for k in (1, 2, 3, 4)]
     if form != "none":
-        found.append(numbered("SEN_PINT", 57, 2, _index(pilot.hash_variable, _INTEGER)))
-    return found
+        objects.append(numbered("SEN_PINT", 57, 2, _index(pilot.hash_variable, _INTEGER)))
+    return objects
 
 
 def _index(variable: str, pattern: str) -> int:
     """Return the index of a variable that RSI can read, 0 of one without."""
-    found = re.fullmatch(pattern, variable, re.IGNORECASE)
-    if found is None:
+    match = re.fullmatch(pattern, variable, re.IGNORECASE)
+    if match is None:
         sentence = f"RSI cannot read {variable} of [pilot], only $SEN_PINT[n] and $SEN_PREA"
         raise RefusedError(Issue("error", "online-pilot", 0, sentence, "correct [pilot], or --pilot none"))
-    return int(found[1]) if found.groups() else 0
+    return int(match[1]) if match.groups() else 0
 
 
 def _corrections(settings: Online) -> list[_Object]:

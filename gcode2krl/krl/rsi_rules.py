@@ -26,8 +26,8 @@ def rsi_name(program: KrlProgram, folder: Path) -> str:
     """
     found = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
     name = next((match[1] for match in found if match and is_file_name(match[1])), "")
-    beside = _beside(folder)
-    flows = (beside.get(f"{name}{suffix}".casefold()) for suffix in w.SIGNAL_FLOW_SUFFIXES.values())
+    files = _beside(folder)
+    flows = (files.get(f"{name}{suffix}".casefold()) for suffix in w.SIGNAL_FLOW_SUFFIXES.values())
     spelled = next((flow for flow in flows if flow is not None), None)
     return spelled.name[: len(name)] if spelled is not None else name
 
@@ -43,8 +43,8 @@ def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
     ]
     if [name for name, _, _ in calls] != _ORDER:
         line = calls[0][1].line if calls else program.def_line
-        found = ", ".join(name for name, _, _ in calls) or "none"
-        yield _issue("rsi-order", line, f"RSI calls are {found}; allowed: {', '.join(_ORDER)}, once each")
+        names = ", ".join(name for name, _, _ in calls) or "none"
+        yield _issue("rsi-order", line, f"RSI calls are {names}; allowed: {', '.join(_ORDER)}, once each")
         return
     create, on, off = (statement for _, statement, _ in calls[:3])
     cycle = w.RSI_FAST if cell.online.cycle_s < w.RSI_SLOW_CYCLE_S else w.RSI_SLOW
@@ -61,10 +61,10 @@ def rsi_issues(program: KrlProgram, cell: Cell) -> Iterator[Issue]:
 
 def rsi_file_issues(path: Path, expected: Mapping[str, bytes]) -> Iterator[Issue]:
     """Yield where the RSI files beside a program are not those that program and cell ask for."""
-    beside = _beside(path.parent)
+    files = _beside(path.parent)
     flows = tuple(w.SIGNAL_FLOW_SUFFIXES.values())
     for file_name in (each for each in expected if each.endswith((w.ETHERNET_SUFFIX, *flows))):
-        file = beside.get(file_name.casefold())
+        file = files.get(file_name.casefold())
         if file is None:
             yield _issue("rsi-file", 0, f"{file_name} is missing beside the program")
         elif file.read_bytes().split() != expected[file_name].split():

@@ -129,8 +129,8 @@ def _setting_issues(program: KrlProgram, cell: Cell) -> list[Issue]:
     for statement in program.statements:
         text = _squeezed(statement.text)
         set_here = _SETTING.match(text)
-        own = set_here is not None and (set_here[1] in _SET_WITH_THE_TOOL or text in tools)
-        if statement.motion > 0 and (_JUMP.match(text) or (set_here is not None and not own)):
+        with_tool = set_here is not None and (set_here[1] in _SET_WITH_THE_TOOL or text in tools)
+        if statement.motion > 0 and (_JUMP.match(text) or (set_here is not None and not with_tool)):
             issues.append(
                 Issue(
                     "error",
@@ -236,7 +236,7 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
     for statement in program.statements:
         word = _FIRST_WORD.match(statement.text)
         first = word.group(0).upper() if word else statement.text[:10]
-        rest = statement.text[len(first) :].lstrip()
+        behind = statement.text[len(first) :].lstrip()
         if w.INITMOV in statement.text.upper():
             starts += 1
         if first in w.MOTIONS_NOT_WRITTEN:
@@ -248,7 +248,7 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
                     f"{first} is a motion this program does not write",
                 )
             )
-        elif rest.startswith("(") and first not in known:
+        elif behind.startswith("(") and first not in known:
             issues.append(
                 Issue(
                     "error",
@@ -258,7 +258,7 @@ def _statement_rules(program: KrlProgram, cell: Cell) -> list[Issue]:
                     "add it to [program] externals of the cell",
                 )
             )
-        elif not (first.startswith("$") or first in known or rest[:1] in ("=", ".", "[", "(")):
+        elif not (first.startswith("$") or first in known or behind[:1] in ("=", ".", "[", "(")):
             issues.append(
                 Issue("error", "krl-unknown", statement.line, f"not understood: {statement.text[:60]!r}")
             )

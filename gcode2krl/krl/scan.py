@@ -77,10 +77,10 @@ def scan_krl(text: bytes | NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) ->
             slice(motion, last_motion),
             slice(first - motion, behind - last_motion),
         )
-        found = np.zeros(4, dtype=np.int64)
+        counts = np.zeros(4, dtype=np.int64)
         columns = kinds[rows], blends[rows], line[rows], pose[own], span[others], value[others]
-        _scan(data, start, end, lines, *columns, found)
-        return found
+        _scan(data, start, end, lines, *columns, counts)
+        return counts
 
     too_long, not_ascii, folds, carried = np.transpose(in_chunks(scanned, borders)).tolist()
     external = np.empty((motions if sum(carried) else 0, w.EXTERNAL_COLUMNS))

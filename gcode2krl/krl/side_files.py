@@ -57,9 +57,9 @@ def data_issues(path: Path, program: KrlProgram, intended: bytes) -> Iterator[Is
         text = file.read_bytes()
     except OSError as error:
         raise input_error("file-unreadable", f"cannot read: {error.strerror}", source=str(file)) from None
-    found, wanted = list(_statements(text)), list(_statements(intended))
-    for k in range(max(len(found), len(wanted))):
-        line, have = found[k] if k < len(found) else (found[-1][0] if found else 0, "nothing")
+    read, wanted = list(_statements(text)), list(_statements(intended))
+    for k in range(max(len(read), len(wanted))):
+        line, have = read[k] if k < len(read) else (read[-1][0] if read else 0, "nothing")
         want = wanted[k][1] if k < len(wanted) else "nothing"
         if _normal(have) != _normal(want):
             sentence = f"{file.name}: found {have[:60]!r}, intended {want[:60]!r}"

@@ -40,8 +40,8 @@ def _misplaced(program: KrlProgram, blocks: list[tuple[int, int]]) -> list[Issue
     is_point[program.spl_rows] = True
     rows: Ints = np.flatnonzero(inside != is_point)[:MOST_PLACES]
     words = "SPL outside a SPLINE block", "a motion that is no SPL within a SPLINE block"
-    found = [_wrong(int(program.line[row]), words[int(inside[row])]) for row in rows.tolist()]
-    return [*found, *(_wrong(0, "a SPLINE block without a point") for a, b in blocks if a == b)]
+    issues = [_wrong(int(program.line[row]), words[int(inside[row])]) for row in rows.tolist()]
+    return [*issues, *(_wrong(0, "a SPLINE block without a point") for a, b in blocks if a == b)]
 
 
 def _wrong(line: int, sentence: str) -> Issue:

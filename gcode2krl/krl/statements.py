@@ -61,8 +61,8 @@ def base_statement(cell: Cell, external: Floats) -> str:
     number, table = cell.frames.base_data, coupled_table(cell)
     if table is not None:
         offset = "GK_BASE" if number is None else f"{w.BASE_DATA}[{number}]"
-        own = f"GK_BASE={frame_text(cell.stated_base())}\n" if number is None else ""
-        return f"{own}{w.BASE}=EK({table}.ROOT,{table}.MECH_TYPE,{offset})"
+        base = f"GK_BASE={frame_text(cell.stated_base())}\n" if number is None else ""
+        return f"{base}{w.BASE}=EK({table}.ROOT,{table}.MECH_TYPE,{offset})"
     if number is not None:
         return f"{w.BAS} (#BASE,{number} )"
     return f"{w.BASE}={frame_text(base_of_controller(cell, external))}"

@@ -54,11 +54,11 @@ def place_triggers(
         deadline_s, earliest_s, windows.order, begin_s, end_s, cycle_s, most, in_view, window, delay
     )
     _delay_at_starts(earliest_s, begin_s, end_s, cycle_s, window, delay)
-    found = window >= 0
+    has_window = window >= 0
     fire_s = windows.begin_s[window] + delay / MS_PER_S
     return Triggers(
-        row=np.where(found, windows.row[window], -1),
-        order=np.where(found, windows.order[window], _BEYOND),
+        row=np.where(has_window, windows.row[window], -1),
+        order=np.where(has_window, windows.order[window], _BEYOND),
         delay_ms=delay,
-        fire_s=np.where(found, fire_s, np.nan),
+        fire_s=np.where(has_window, fire_s, np.nan),
     )

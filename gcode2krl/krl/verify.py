@@ -1,7 +1,7 @@
 """Verify: the program read back against what it should say, and against the controller's rules."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
-from gcode2krl.chain import Plan, forecast_of, prepare
+from gcode2krl.chain import Plan, forecast_of, foresee, prepare
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue, RefusedError
 from gcode2krl.exchange.findings import Findings, counted, findings_block
@@ -19,14 +19,15 @@ from gcode2krl.exchange.html import block, text_table
 from gcode2krl.krl.announce import pilot_force
 from gcode2krl.krl.arcs import unrolled
 from gcode2krl.krl.cell_hashes import StatedCell
-from gcode2krl.krl.composition import MESSAGE_SETUP, Layout, compose
+from gcode2krl.krl.composition import MESSAGE_SETUP, TextLayout, compose
 from gcode2krl.krl.differences import JOINT_LIMIT_DEG, POSITION_LIMIT_MM, REMEDY, differences_of
-from gcode2krl.krl.hazards import judged
 from gcode2krl.krl.original_path import OriginalFigures, compare_with_original, require_stated
 from gcode2krl.krl.pieces import pieces_in, split
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures, check_pilot, checksum_of
 from gcode2krl.krl.pilot_text import PilotText
 from gcode2krl.krl.read import KrlProgram, Statement, read_krl, read_texts
+from gcode2krl.krl.release import is_refusing, released_again
+from gcode2krl.krl.rsi_refusals import online_issues, retract_issues
 from gcode2krl.krl.rsi_rules import rsi_file_issues, rsi_name
 from gcode2krl.krl.rules import in_file, rule_issues, state_issues
 from gcode2krl.krl.side_files import beside, data_issues, declares_itself, missing, missing_parts
@@ -38,6 +39,39 @@ from gcode2krl.program.arcs import arcs_of
 from gcode2krl.program.splines import splines_of
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import DEG_PER_RAD, S_PER_MIN
+
+# The findings that would refuse a program, or be told with it, judged anew with the cell as it is now.
+
+
+def judged(
+    plan: Plan,
+    prediction: Prediction | None,
+    releases: Mapping[str, int | None],
+    *,
+    online: bool,
+    forces: bool,
+) -> list[Issue]:
+    """Return errors and warnings of the checks of a translation, each with the G-code as its file.
+
+    Those that a Prediction brings along are not run again.
+    ``releases`` are those in the header of the program and how many findings each was for, None for any.
+    ``forces`` cuts material too.
+    """
+    targets, cell = plan.targets, plan.cell
+    known = [*targets.issues] if prediction is None else [*prediction.issues]
+    if online:
+        known = [*online_issues(targets, cell), *retract_issues(targets, cell), *known]
+    if prediction is None and not is_refusing(known, releases):  # else nothing can be foreseen
+        forecast = foresee(plan, forces=forces)
+        known += forecast.issues[len(targets.issues) :]
+    return list(_of_gcode(released_again(known, releases), plan.toolpath.source))
+
+
+def _of_gcode(issues: Iterable[Issue], source: str) -> Iterator[Issue]:
+    """Yield the findings but the notes, with the file that they are about."""
+    for issue in issues:
+        if issue.severity != "note":
+            yield issue if issue.file else replace(issue, file=source)
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,8 +116,8 @@ class VerifyReport:
     def words(self) -> str:
         """Return the outcome in words: ``457 motions, off by 0.0007 mm``."""
         off = f"off by {self.max_deviation_mm:.4f} mm, {self.max_rotation_deg:.4f} deg"
-        found = counted(self.issues)
-        return ", ".join([f"{self.motions} motions", off, *([found] if found else [])])
+        counts = counted(self.issues)
+        return ", ".join([f"{self.motions} motions", off, *([counts] if counts else [])])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints; what is not a number is null."""
@@ -175,7 +209,7 @@ def verify_krl(
     alone = declares_itself(program)
     arcs = tuple(arcs_of(targets)) if len(program.circ_rows) else ()
     splines = tuple(splines_of(targets, bool(arcs))) if len(program.spl_rows) else ()
-    layout = Layout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
+    layout = TextLayout(guard=program.guard, online=online, single_file=alone, arcs=arcs, splines=splines)
     composed = compose(targets, joints, cell, program.name, layout, pilot)
     expected = {name: b"".join(pieces) for name, pieces in composed.items()}
     if not alone:
@@ -297,15 +331,15 @@ def _home_issues(program: KrlProgram, targets: Targets, joints: Joints, count: i
     """Return where HOME is another, axis by axis."""
     issues = []
     for row in np.flatnonzero(targets.home[:count] & program.ptp[:count]):
-        found, wanted = _joints_at(program, int(row)), joints.q_rad[row] * DEG_PER_RAD
-        wrong = np.flatnonzero(~(np.abs(found - wanted) <= JOINT_LIMIT_DEG))
+        stated_deg, wanted = _joints_at(program, int(row)), joints.q_rad[row] * DEG_PER_RAD
+        wrong = np.flatnonzero(~(np.abs(stated_deg - wanted) <= JOINT_LIMIT_DEG))
         if not len(wrong):
             continue
-        if np.isnan(found).all():
+        if np.isnan(stated_deg).all():
             text = "HOME is not given by its joints, A1 to A6"
         else:
             text = "HOME: " + ", ".join(
-                f"A{k + 1} is {'missing' if np.isnan(found[k]) else f'{found[k]:.4f}'}, "
+                f"A{k + 1} is {'missing' if np.isnan(stated_deg[k]) else f'{stated_deg[k]:.4f}'}, "
                 f"intended {wanted[k]:.4f} deg"
                 for k in wrong
             )
@@ -364,12 +398,12 @@ def _statement_issues(
     read: tuple[Statement, ...], intended: tuple[Statement, ...], program: KrlProgram
 ) -> list[Issue]:
     """Compare what stands between the motions: settings, guard, outputs, waits, calls, declarations."""
-    found = [(s.motion, _normal(s.text)) for s in read]
+    statements = [(s.motion, _normal(s.text)) for s in read]
     wanted = [(s.motion, _normal(s.text)) for s in intended]
-    if found == wanted:
+    if statements == wanted:
         return []
-    shorter = min(len(found), len(wanted))
-    at = next((k for k, (a, b) in enumerate(zip(found, wanted, strict=False)) if a != b), shorter)
+    shorter = min(len(statements), len(wanted))
+    at = next((k for k, (a, b) in enumerate(zip(statements, wanted, strict=False)) if a != b), shorter)
     here = read[min(at, len(read) - 1)] if read else Statement(0, "", program.file[0], 0)
     have = read[at].text if at < len(read) else "nothing"
     want = intended[at].text if at < len(intended) else "nothing"
@@ -383,12 +417,12 @@ def _statement_issues(
 
 def _uncalled_issues(program: KrlProgram, intended: KrlProgram) -> list[Issue]:
     """Compare the subprograms that triggers call, whatever file they stand in."""
-    found, wanted = (
+    read_tool, wanted = (
         {(key.split("/")[-1], texts) for key, texts in p.uncalled.items()} for p in (program, intended)
     )
     return [
         Issue("error", "verify-statement", program.def_line, f"subprogram {name} is not as intended", REMEDY)
-        for name, _ in sorted(found ^ wanted)
+        for name, _ in sorted(read_tool ^ wanted)
     ]
 
 

@@ -16,7 +16,7 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.krl.announce import PilotPlan
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import TextLayout, compose
 from gcode2krl.krl.pilot_check import PilotCase, PilotFigures
 from gcode2krl.krl.pilot_plan import left_out, plan_pilot
 from gcode2krl.krl.pilot_text import PilotText
@@ -68,8 +68,8 @@ class WrittenProgram:
         return Findings(self.issues)
 
     def __repr__(self) -> str:
-        found = counted(self.issues)
-        facts = [f"{len(self.files)} files", self.report.words(), *([found] if found else [])]
+        counts = counted(self.issues)
+        facts = [f"{len(self.files)} files", self.report.words(), *([counts] if counts else [])]
         return f"WrittenProgram({self.name}: {', '.join(facts)})"
 
     def _repr_html_(self) -> str:
@@ -155,7 +155,7 @@ def write_krl(
     found = [*of_name, *about_curves, *forecast.issues]
     allow = (*allow, *matching(found, allow_where_found))
     issues = list(released(found, allow, strict))
-    layout = Layout(
+    layout = TextLayout(
         guard,
         split if file is not None else "defs",
         single_file=file is None,
@@ -205,7 +205,7 @@ class _Writing:
     """Where a program goes, how it is laid out, and the Toolpath that it is held against."""
 
     files: ProgramFiles
-    layout: Layout
+    layout: TextLayout
     cell: Cell
     original: Toolpath | None
 
@@ -347,8 +347,8 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
 
 
 def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell, split: str) -> list[Issue]:
-    beside = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
-    program = (text for name, text in texts.items() if not name.endswith(beside))
+    suffixes = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
+    program = (text for name, text in texts.items() if not name.endswith(suffixes))
     size_mb = sum(map(len, program)) / BYTES_PER_MB
     motions = int(np.count_nonzero(~targets.ptp))
     if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:

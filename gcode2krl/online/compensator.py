@@ -7,6 +7,7 @@ Every stage is a pure function ``(state, rows) -> (state, rows)``: `stream` take
 one cycle of a running robot, and both give the same bits.
 """
 
+import math
 from dataclasses import dataclass, field, fields
 from typing import Literal, NamedTuple
 
@@ -17,12 +18,12 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.cell.carried import require_still
 from gcode2krl.cell.sections.online import Online
+from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, INT, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import shaped
 from gcode2krl.compliance import deflection_of, missing_stiffness
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
 from gcode2krl.errors import NotUnderstoodError, input_error
-from gcode2krl.online.blending import BlendState, blend_start, blended
 from gcode2krl.online.feed import FeedState, feed_of, feed_start
-from gcode2krl.online.filters import FilterState, filter_start, filtered
 from gcode2krl.online.limits import Bounds, LimitState, axis_bounds, cartesian_bounds, limit_start, limited
 from gcode2krl.online.pilot_gate import Announced, GateState, PilotTable, estimate, gate_start, pilot_table
 from gcode2krl.pilot import Knots, PilotHeader
@@ -30,11 +31,138 @@ from gcode2krl.robot.inverse_kinematics import all_branches
 from gcode2krl.robot.kinematics import flange_pose, status_turn
 from gcode2krl.units import RAD_PER_DEG
 
+# The quasi-static part of a sensor's signal: low-pass, moving average (Haehn & Weigold 2020, section 2.2).
+#
+# A filter is one compiled loop over rows that carries its state from call to call, so that a whole stream
+# and the same stream sample by sample give the same bits.
+
+WIDTH = 6
+"""Force x, y, z in N and moment x, y, z in N·mm."""
+
+_filter = core_function(
+    "online_filter",
+    *(FLOATS, OUT_FLOATS, OUT_FLOATS, OUT_INTS),
+    *(FLOAT, INT, FLOAT),
+    *(OUT_FLOATS, OUT_BOOLS),
+)
+
+
+class FilterState(NamedTuple):
+    """State of the filter."""
+
+    low: Floats
+    """(6,) output of the low-pass."""
+    window: Floats
+    """(k, 6) the last k outputs of the low-pass."""
+    counts: Ints
+    """(2,) samples so far; samples in a row that were not numbers."""
+
+
+def filter_start(settings: Online) -> FilterState:
+    """Return the state before the first sample, which then fills it: no transient at the start."""
+    length = max(1, round(settings.average_s / settings.cycle_s))
+    return FilterState(np.zeros(WIDTH), np.zeros((length, WIDTH)), np.zeros(2, dtype=np.int64))
+
+
+def filtered(state: FilterState, load: Floats, settings: Online) -> tuple[FilterState, Floats, Bools]:
+    """Return the filtered loads (n, 6), and (n,) True where the sensor is lost.
+
+    First-order low-pass, exact for an input that is held over a cycle, then the mean of the last
+    ``average_s``. A sample that is not a number, or above ``most_force_N``, leaves the output unchanged;
+    more of them in a row than ``sensor_hold_s`` mean a lost sensor, and so does, at once, a force that is too
+    large for a cut.
+    """
+    values = shaped("load", load, -1, WIDTH)
+    after = FilterState(state.low.copy(), state.window.copy(), state.counts.copy())
+    out, lost = np.empty(values.shape), np.zeros(len(values), dtype=np.bool_)
+    share = -math.expm1(-2.0 * math.pi * settings.lowpass_hz * settings.cycle_s)
+    allowed = round(settings.sensor_hold_s / settings.cycle_s)
+    _filter(values, after.low, after.window, after.counts, share, allowed, settings.most_force_N, out, lost)
+    return after, out, lost
+
+
+# Blends the measured force with the pilot's estimate (Haehn & Weigold 2020, section 2.3).
+#
+# While both differ by less than a threshold the measurement is used: it includes wear and the real
+# material. Beyond the threshold a change of direction or the cutter's exit is assumed, which the filtered
+# measurement shows too late: the signal changes to the estimate linearly within the blend time, and back in
+# the same way.
+#
+# Our choices where the paper is silent: the difference is the length of the vector; blending back takes the
+# same time; and an estimate that stays beyond the threshold while it does not change is a wrong estimate,
+# not an event. It is then not used until both agree again.
+
+STEADY_SHARE = 0.2
+"""An estimate is steady while it changes by less than this fraction of the threshold; our choice."""
+WEIGHT, BEYOND_S, DISTRUSTED = 0, 1, 2
+ANCHOR, LAST = 3, 6
+
+_blend = core_function(
+    "online_blend",
+    *(FLOATS, FLOATS, BOOLS, OUT_FLOATS),
+    *(FLOAT, FLOAT, FLOAT, FLOAT),
+    *(OUT_FLOATS, OUT_FLOATS, OUT_BOOLS),
+)
+
+
+class BlendState(NamedTuple):
+    """State of the blend."""
+
+    values: Floats
+    """(9,) weight of the estimate, time beyond the threshold in a steady cut, distrust; the estimate at the
+    start of that time (3), and the last known estimate (3)."""
+
+
+class Blend(NamedTuple):
+    """The load to compensate, and how it was blended."""
+
+    load: Floats
+    """(n, 6)"""
+    weight: Floats
+    """(n,) weight of the estimate, 0 to 1."""
+    distrusted: Bools
+    """(n,) True while an estimate is not trusted."""
+
+
+def blend_start() -> BlendState:
+    """Return the state before the first sample: the measurement is used."""
+    return BlendState(np.zeros(9))
+
+
+def blended(
+    state: BlendState, measured: Floats, estimate_N: Floats, known: Bools, settings: Online
+) -> tuple[BlendState, Blend]:
+    """Return the superposition of measured loads (n, 6) and estimated forces (n, 3).
+
+    ``known`` (n,) is False where there is no estimate; the last one is then blended out as above.
+    The estimate has no moment: its part of the load has none.
+    """
+    values = shaped("measured", measured, -1, 6)
+    after = BlendState(state.values.copy())
+    blend = Blend(np.empty(values.shape), np.empty(len(values)), np.zeros(len(values), dtype=np.bool_))
+    patience_s = settings.pilot_lead_s + settings.blend_s + 2.0 * settings.filter_s
+    estimate = shaped("estimate_N", estimate_N, len(values), 3)
+    _blend(
+        values,
+        estimate,
+        np.ascontiguousarray(known),
+        after.values,
+        settings.cycle_s,
+        settings.threshold_N,
+        settings.blend_s,
+        patience_s,
+        blend.load,
+        blend.weight,
+        blend.distrusted,
+    )
+    return after, blend
+
+
 LoadFrame = Literal["base", "tcp", "sensor"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Samples:
+class CycleInputs:
     """Inputs, a row for each cycle."""
 
     time_s: Floats
@@ -53,11 +181,11 @@ class Samples:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def rows(self, start: int, end: int) -> "Samples":
+    def rows(self, start: int, end: int) -> "CycleInputs":
         """Return some rows."""
         told = Announced(*(column[start:end] for column in self.told))
         own = {f.name: getattr(self, f.name)[start:end] for f in fields(self) if f.name != "told"}
-        return Samples(**own, told=told)
+        return CycleInputs(**own, told=told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,13 +289,13 @@ def start(device: Compensator) -> State:
     )
 
 
-def step(device: Compensator, state: State, sample: Samples) -> tuple[State, Corrections]:
+def step(device: Compensator, state: State, sample: CycleInputs) -> tuple[State, Corrections]:
     """Return the state after one cycle, and its correction; `sample` has one row."""
     return stream(device, state, sample)
 
 
 def stream(
-    device: Compensator, state: State, samples: Samples, held: Bools | None = None
+    device: Compensator, state: State, samples: CycleInputs, held: Bools | None = None
 ) -> tuple[State, Corrections]:
     """Return the state after all rows, and their corrections; ``held`` rows (n,) repeat the last one.
 
@@ -220,7 +348,7 @@ def _tool_rotation(q_rad: Floats, cell: Cell, tool: int) -> Floats:
     return turned
 
 
-def _load_base(device: Compensator, samples: Samples, rotation: Floats) -> Floats:
+def _load_base(device: Compensator, samples: CycleInputs, rotation: Floats) -> Floats:
     """Return force and moment (n, 6) about the tip along ``$BASE``."""
     force, moment = samples.load[:, :3], samples.load[:, 3:]
     if device.load_frame == "base":

@@ -16,7 +16,7 @@ from gcode2krl.compliance import project_normal, tip_position
 from gcode2krl.compliance.sensor import Calibration
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.frames import invert
-from gcode2krl.online.compensator import Corrections, Samples, build_compensator, start, stream
+from gcode2krl.online.compensator import Corrections, CycleInputs, build_compensator, start, stream
 from gcode2krl.online.pilot_gate import Announced, Gate
 from gcode2krl.online.plant import reaction, tip_shift_mm
 from gcode2krl.online.twin import World
@@ -79,7 +79,7 @@ def replay(
         raise input_error("run-clock", "controller and force do not overlap", source=str(run.folder))
     moment = force.moment_Nmm if force.moment_Nmm is not None else np.zeros((len(force), 3))
     command = _at(controller, q_command, time_s)
-    samples = Samples(
+    samples = CycleInputs(
         time_s=time_s,
         load=_silent(force, _at(force, np.concatenate([force.force_N, moment], axis=1), time_s), time_s),
         q_rad=_at(controller, q_rad, time_s),
@@ -175,7 +175,7 @@ def _announced(run: Run, time_s: Floats, knots: Knots | None, header: PilotHeade
     )
 
 
-def _errors(run: Run, samples: Samples, shift: Floats) -> tuple[Floats | None, Floats | None]:
+def _errors(run: Run, samples: CycleInputs, shift: Floats) -> tuple[Floats | None, Floats | None]:
     """Return the measured deviation normal to the feed, and the rest after the shift; ends are NaN."""
     tracker = run.tracker
     if tracker is None or run.head.frames.tracker != "base":

@@ -1,22 +1,87 @@
 """Results of the twin: the four figures of the paper, and the details behind them."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcode2krl.arrays import Ints32
+from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import Issue
-from gcode2krl.online.gain import gain_of
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
-from gcode2krl.online.twin import CASES, Case, Run, Twin, as_settings, simulate
+from gcode2krl.online.twin import CASES, Case, Twin, TwinRun, as_settings, simulate
 from gcode2krl.progress import Progress, unheard
 
-Runs = Mapping[Case, Run]
+MATTERS_MM = 0.01
+"""A smaller difference is neither better nor worse: a robot's path repeats no more closely."""
+_MOST_LINES = 5
 
 
-def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, Run]:
+class WorseLine(NamedTuple):
+    """A line of G-code in which a compensation makes the part worse."""
+
+    line: int
+    excess_mm: float
+    """By how much at the worst sample."""
+    time_s: float
+    """For how long."""
+
+
+class Gain(NamedTuple):
+    """A case beside the uncompensated one, over the samples that are judged."""
+
+    rms_mm: float
+    rms_less_percent: float | None
+    better_share: float
+    worse_share: float
+    """Of the judged time; the rest differs by less than `MATTERS_MM`."""
+    worst_line: int
+    """Where the largest deviation of the case is."""
+    worse: tuple[WorseLine, ...]
+    """The largest excess first."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {**self._asdict(), "worse": [each._asdict() for each in self.worse]}
+
+
+def gain_of(
+    before_mm: Floats, after_mm: Floats, counts: Bools, source_line: Ints32, cycle_s: float
+) -> Gain | None:
+    """Return what a case gains; all (n,), deviations normal to the feed. None where nothing is judged."""
+    if not counts.any():
+        return None
+    before, after, line = before_mm[counts], after_mm[counts], source_line[counts]
+    excess = after - before
+    rms_before, rms_after = _rms(before), _rms(after)
+    worse = excess > MATTERS_MM
+    findings = [
+        _worse_line(int(number), excess, worse & (line == number), cycle_s)
+        for number in np.unique(line[worse])
+    ]
+    findings.sort(key=lambda each: -each.excess_mm)
+    return Gain(
+        rms_mm=rms_after,
+        rms_less_percent=100.0 * (1.0 - rms_after / rms_before) if rms_before else None,
+        better_share=float((excess < -MATTERS_MM).mean()),
+        worse_share=float(worse.mean()),
+        worst_line=int(line[np.argmax(after)]),
+        worse=tuple(findings[:_MOST_LINES]),
+    )
+
+
+def _worse_line(number: int, excess_mm: Floats, where: Bools, cycle_s: float) -> WorseLine:
+    return WorseLine(number, float(excess_mm[where].max()), float(where.sum() * cycle_s))
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+Runs = Mapping[Case, TwinRun]
+
+
+def simulate_all(twin: Twin, progress: Progress = unheard) -> dict[Case, TwinRun]:
     """Return the four cases."""
     runs = {}
     for case in CASES:
@@ -100,11 +165,11 @@ def findings(twin: Twin, runs: Runs, judged: Judged) -> list[Issue]:
     return issues
 
 
-def _worst(run: Run, where: Any) -> float | None:
+def _worst(run: TwinRun, where: Any) -> float | None:
     return float(run.normal_mm[where].max()) if where.any() else None
 
 
-def _depth(twin: Twin, run: Run, judged: Judged) -> float | None:
+def _depth(twin: Twin, run: TwinRun, judged: Judged) -> float | None:
     """Return the largest deviation along the tool axis in mm."""
     if not judged.counts.any():
         return None

@@ -20,7 +20,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.frames import rotation_from_quaternion
-from gcode2krl.online.compensator import Compensator, Samples, State, joints_at, start, step
+from gcode2krl.online.compensator import Compensator, CycleInputs, State, joints_at, start, step
 from gcode2krl.online.feed import feed_of
 from gcode2krl.online.limits import towards
 from gcode2krl.online.pilot_gate import NO_KNOT_YET, Announced, Gate
@@ -211,8 +211,8 @@ def _settle(session: Session, telegram: Telegram, load: Floats, device: Compensa
         return replace(session, cycles=0)
     if session.cycles < probe.settle_cycles:
         return session
-    beside = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
-    if beside > probe.rest_mm:
+    off_mm = np.abs(telegram.position_mm - session.rest_mm - moved * session.probe).max()
+    if off_mm > probe.rest_mm:
         return _enter(session, Phase.RESTING, "moved", rest_mm=telegram.position_mm)
     if not session.seen:
         return _enter(session, Phase.RESTING, "probe-not-seen", rest_mm=telegram.position_mm)
@@ -347,10 +347,10 @@ def knot_of(values: Floats, last: int, device: Compensator) -> int:
     return UNKNOWN_KNOT
 
 
-def sample_of(telegram: Telegram, load: Floats) -> Samples:
+def sample_of(telegram: Telegram, load: Floats) -> CycleInputs:
     """Return a telegram and the sensor's load (6,) as one row for the compensator."""
     pilot = (telegram.knot, telegram.checksum, telegram.override_percent, telegram.t1)
-    return Samples(
+    return CycleInputs(
         time_s=np.array([_S_PER_MS * telegram.ipoc]),
         load=load[None],
         q_rad=telegram.q_rad[None],

@@ -6,7 +6,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.online.judge import CELL_MM, SIDE_RAD, Judged, floor_over, grid_of
-from gcode2krl.online.twin import Run
+from gcode2krl.online.twin import TwinRun
 from gcode2krl.prediction import Prediction
 
 
@@ -30,7 +30,7 @@ class Surface(NamedTuple):
         return max(float(part.max(initial=0.0)) for part in both)
 
 
-def surface_of(prediction: Prediction, run: Run, judged: Judged) -> Surface:
+def surface_of(prediction: Prediction, run: TwinRun, judged: Judged) -> Surface:
     """Return how the part that a run leaves differs from the one its commanded path would leave.
 
     The floor is the lowest tip over each cell, of a flat bottom. Walls are where an edge passes the side of

@@ -21,7 +21,7 @@ from gcode2krl.errors import input_error
 from gcode2krl.online.compensator import (
     Compensator,
     Corrections,
-    Samples,
+    CycleInputs,
     build_compensator,
     joints_at,
     start,
@@ -71,7 +71,7 @@ class World:
     seed: int = 1
 
 
-class Run(NamedTuple):
+class TwinRun(NamedTuple):
     """One case of the twin, n samples."""
 
     case: Case
@@ -138,12 +138,12 @@ def twin_of(prediction: Prediction, settings: Online, world: World) -> Twin:
     return Twin(cell, settings, world, motion, joints, forces, knots, header, int(tools[0]))
 
 
-def simulate(twin: Twin, case: Case) -> Run:
+def simulate(twin: Twin, case: Case) -> TwinRun:
     """Return one case: no compensation, Cartesian, Cartesian with pilot, axis-specific with pilot."""
     time_s = twin.motion.time_s / twin.world.feed_scale
     force, moment = _late(twin, time_s)
     device = None if case == "uncompensated" else _device(twin, case)
-    told = _announced(twin, time_s)
+    announced = _announced(twin, time_s)
     noise = np.random.default_rng(twin.world.seed).normal(0.0, twin.world.noise_N, (len(time_s), 3))
     shift = np.zeros((len(time_s), 3))
     corrections: Corrections | None = None
@@ -158,14 +158,14 @@ def simulate(twin: Twin, case: Case) -> Run:
         if before is not None and np.abs(tip - before).max(initial=0.0) < SETTLED_MM:
             break
         if device is not None:
-            _, corrections = stream(device, start(device), _samples(twin, time_s, load, present, told))
+            _, corrections = stream(device, start(device), _samples(twin, time_s, load, present, announced))
             shift = _shift(twin, corrections.correction, time_s)
     else:
         raise AssertionError(f"the loop did not settle within {MOST_ROUNDS} rounds")
     velocity = np.gradient(twin.motion.position_mm, twin.motion.time_s, axis=0)
     normal = np.linalg.norm(project_normal(tip, velocity), axis=1)
     needed = np.linalg.norm(project_normal(bent, velocity), axis=1)
-    return Run(case, time_s, tip, normal, shift, needed, force, corrections, rounds)
+    return TwinRun(case, time_s, tip, normal, shift, needed, force, corrections, rounds)
 
 
 def as_settings(twin: Twin) -> dict[str, float | str | bool]:
@@ -232,8 +232,8 @@ def _sensed(twin: Twin, force: Floats, moment: Floats, noise: Floats, time_s: Fl
     return np.stack([np.interp(at, time_s, column) for column in load.T], axis=1)
 
 
-def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: Announced) -> Samples:
-    return Samples(
+def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: Announced) -> CycleInputs:
+    return CycleInputs(
         time_s=time_s,
         load=load,
         q_rad=present,

@@ -58,8 +58,8 @@ def _least_moved(at: Floats, low: Floats, high: Floats, knot: Ints) -> Floats:
     )
     most = np.concatenate([high, -low, np.zeros(3 * gaps)])
     cost = np.concatenate([np.zeros(knots), np.ones(gaps), [_SLOWER * float(at[-1] - at[0]), _INSIDE]])
-    found = linprog(cost, A_ub=above, b_ub=most, bounds=bounds)
-    return np.asarray(found.x[:knots])
+    solution = linprog(cost, A_ub=above, b_ub=most, bounds=bounds)
+    return np.asarray(solution.x[:knots])
 
 
 def taut(at: Floats, low: Floats, high: Floats) -> Floats:

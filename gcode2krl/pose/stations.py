@@ -434,8 +434,8 @@ def _corridor(
     rows = np.arange(len(track))
     enough = np.maximum(LEAST, _NEARLY * np.minimum(margin[rows, track], GOOD))
     stiff = bent <= (1.0 + _SOFTER) * np.min(bent, axis=1, keepdims=True)
-    beside = np.abs(np.arange(len(places)) - track[:, None]) <= 1  # so that coarse places make no stairs
-    within = (margin >= enough[:, None]) & (stiff | beside)
+    neighbour = np.abs(np.arange(len(places)) - track[:, None]) <= 1  # so that coarse places make no stairs
+    within = (margin >= enough[:, None]) & (stiff | neighbour)
     within[rows, track] = True
     ends = np.array([_around(place, here) for place, here in zip(track.tolist(), within, strict=True)])
     at = places[:, axis.column]

@@ -17,7 +17,7 @@ import numpy as np
 from gcode2krl.cell import Cell, as_toml, cell_from_resolved
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.exchange.disk_names import counted_pattern, names_of_parts
-from gcode2krl.exchange.frame import Columns
+from gcode2krl.exchange.frame import ColumnFrame
 from gcode2krl.files import Content
 from gcode2krl.prediction.record import REMEDY, SCHEMA, PredictionRecord, events_of, read_record
 from gcode2krl.prediction.tables import PARQUET_TYPES, check_numbers, check_references, read_table
@@ -45,7 +45,7 @@ _ADDED = re.compile(r"q[1-6]_(act|load)_rad|(force|moment)_meas_[xyz]_(N|Nmm)|pa
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
-def table_files(place: Path, tables: Mapping[str, Columns], csv: bool) -> dict[Path, Content]:
+def table_files(place: Path, tables: Mapping[str, ColumnFrame], csv: bool) -> dict[Path, Content]:
     """Return the files of tables by name and what writes them; with ``csv`` as CSV too."""
     from gcode2krl.exchange.arrow import write_parquet
 
@@ -111,8 +111,8 @@ def _cell_of(record: PredictionRecord, file: Path) -> Cell:
     try:
         return cell_from_resolved(record.cell, source=str(file))
     except NotUnderstoodError as error:
-        first, *rest = error.issues
-        more = f" (and {len(rest)} more)" if rest else ""
+        first, *others = error.issues
+        more = f" (and {len(others)} more)" if others else ""
         message = f"cell: {first.message}{more}"
         raise NotUnderstoodError(Issue("error", first.code, 0, message, REMEDY), str(file)) from None
 
@@ -155,8 +155,8 @@ def _parts(record: PredictionRecord, frames: dict[str, Any], cell: Cell) -> dict
     for table in parts.values():
         if isinstance(table, Table):
             check_numbers(table)
-    beside = (parts.get("motion"), parts.get("forces"))
-    check_references(toolpath, targets, *beside, set(cell.tool), parts.get("clearance"))
+    tables = (parts.get("motion"), parts.get("forces"))
+    check_references(toolpath, targets, *tables, set(cell.tool), parts.get("clearance"))
     return parts
 
 

@@ -172,11 +172,11 @@ def events_of(records: tuple[_EventRecord, ...], rows: int, table: str) -> tuple
 
 
 def _wrong_key(error: ValidationError, file: Path) -> NotUnderstoodError:
-    first, *rest = error.errors(include_url=False)
+    first, *others = error.errors(include_url=False)
     key = ".".join(str(step) for step in first["loc"])[:120]
     allowed = first["msg"].removeprefix("Input should be ")
     reason = (
         "missing" if first["type"] == "missing" else f"found {repr(first['input'])[:60]}, allowed: {allowed}"
     )
-    more = f" (and {len(rest)} more)" if rest else ""
+    more = f" (and {len(others)} more)" if others else ""
     return input_error("prediction-key", f"{key}: {reason}{more}", REMEDY, source=str(file))

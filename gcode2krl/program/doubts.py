@@ -1,7 +1,10 @@
 """Valid G-code that is hardly intended: warnings from the G-code and the cell alone."""
 
 import math
+import re
 from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
@@ -10,9 +13,36 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.layout import obstacle_box, stock_box
 from gcode2krl.cell.sections import Material, Tool
 from gcode2krl.errors import Issue
-from gcode2krl.program.source_text import line_with
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MS_PER_S, RAD_PER_REV, S_PER_MIN
+
+# Looking a word up in the G-code itself, for findings whose table knows only the move before it.
+
+MOST_LINES = 1000
+
+
+def line_with(source: str, pattern: str, first: int, last: int, *, from_end: bool = False) -> int | None:
+    """Return the 1-based line between two lines (both included) whose code matches a pattern.
+
+    ``pattern`` is compared with the text in capitals, without comments and blanks. None where no line does,
+    or the file cannot be read again (standard input).
+    """
+    first = max(first, last - MOST_LINES if from_end else first, 1)
+    try:
+        with Path(source).open(encoding="latin-1") as file:
+            lines = list(islice(file, first - 1, min(last, first + MOST_LINES)))
+    except (OSError, ValueError):
+        return None
+    wanted = re.compile(pattern)
+    matching = [k for k, text in enumerate(lines, start=first) if wanted.search(_code(text))]
+    if not matching:
+        return None
+    return matching[-1] if from_end else matching[0]
+
+
+def _code(text: str) -> str:
+    return re.sub(r"\([^)]*\)?|;.*|\s+", "", text).upper()
+
 
 LONG_DWELL_S = 30.0
 """Assumed: a spindle needs some seconds to start, a chip some turns to break; 30 s are probably a wrong
@@ -77,18 +107,18 @@ def _blends(toolpath: Toolpath, cell: Cell, tolerance_mm: float | None, feed: Bo
         g64_line = line_with(toolpath.source, r"G64.*P", 1, line, from_end=True)
         remedy = "G64 P0.05 is usual; under G20 P counts inches"
         yield _wide_blend(f"G64 P allows corners to be {value:g} mm off", g64_line or line, remedy)
-    rest = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
-    if not rest.any():
+    blended = feed & ~toolpath.exact_stop & np.isnan(toolpath.tolerance_mm)
+    if not blended.any():
         return
     tolerance = tolerance_mm if tolerance_mm is not None else controller.tolerance_mm
     if tolerance is not None:
         if tolerance > WIDE_CORNER_MM:
             name = "--tolerance" if tolerance_mm is not None else "[controller] tolerance_mm ="
-            line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, rest)[0]])
+            line = int(toolpath.source_line[_widest_corner(toolpath, 1e9, blended)[0]])
             words = f"{name} {tolerance:g} allows corners to be as many mm off"
             yield _wide_blend(words, line, "0.02 to 0.2 is usual")
     elif controller.cdis_mm * math.sqrt(0.125) > WIDE_CORNER_MM:
-        row, error_mm = _widest_corner(toolpath, controller.cdis_mm, rest)
+        row, error_mm = _widest_corner(toolpath, controller.cdis_mm, blended)
         words = f"[controller] cdis_mm = {controller.cdis_mm:g} rounds corners, this one by {error_mm:.3f} mm"
         yield _wide_blend(words, int(toolpath.source_line[row]), "0.05 to 1 is usual for milling")
 

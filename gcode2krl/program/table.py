@@ -29,8 +29,8 @@ def below_table(targets: Targets, cell: Cell) -> Iterator[Issue]:
     below = lowest_mm < table_mm - _GRID_MM
     starts = np.flatnonzero(below & ~np.concatenate([[False], below[:-1]]))
     for row in starts[:_MOST].tolist():
-        rest = np.flatnonzero(~below[row:])
-        end = row + int(rest[0]) if len(rest) else len(below)
+        above = np.flatnonzero(~below[row:])
+        end = row + int(above[0]) if len(above) else len(below)
         depth_mm = table_mm - float(lowest_mm[row:end].min())
         what = "HOME" if targets.home[row] else f"T{targets.tool[row]}"
         yield Issue(

@@ -19,7 +19,7 @@ _FILLED = 0.05
 """Share of filled columns above which a line says nothing."""
 
 
-class Columns(NamedTuple):
+class TimeColumns(NamedTuple):
     """Which rows lie in which column: c columns of equal time."""
 
     edge_s: Floats
@@ -56,15 +56,15 @@ class Columns(NamedTuple):
 
     def quantiles(self, values: Floats, shares: tuple[float, ...]) -> Floats:
         """Return (len(shares), c) quantiles of the values in each column: the nearest sample below."""
-        found = np.full((len(shares), len(self.edge_s) - 1), np.nan)
+        columns = np.full((len(shares), len(self.edge_s) - 1), np.nan)
         present = np.where(np.isfinite(values), values, np.nan)
         ends = np.append(self.start[1:], self.rows)
         for column, start, end in zip(self.held.tolist(), self.start.tolist(), ends.tolist(), strict=True):
             ordered = np.sort(present[start:end])  # NaN last
             count = end - start - int(np.count_nonzero(np.isnan(ordered)))
             if count:
-                found[:, column] = ordered[[round(share * (count - 1)) for share in shares]]
-        return found
+                columns[:, column] = ordered[[round(share * (count - 1)) for share in shares]]
+        return columns
 
     def mean(self, values: Floats | Bools) -> Floats:
         """Return (c,) the mean of the values of each column, NaN where it holds none."""

@@ -22,12 +22,12 @@ def corners_apart(along: Floats, corner: Bools, move: Ints32, least: float) -> B
     edges = np.flatnonzero(np.diff(np.concatenate([[False], corner, [False]]).astype(np.int8)))
     first, last = edges[::2], edges[1::2] - 1
     gap = np.concatenate([[np.inf], along[first[1:]] - along[last[:-1]], [np.inf]])
-    apart = (np.minimum(gap[:-1], gap[1:]) > least) & (move[last] - move[first] <= 1)
+    is_apart = (np.minimum(gap[:-1], gap[1:]) > least) & (move[last] - move[first] <= 1)
     shown = np.zeros(len(corner) + 1, dtype=np.int64)
-    shown[first[apart]] += 1
-    shown[last[apart] + 1] -= 1
-    told: Bools = np.cumsum(shown)[:-1] > 0
-    return told
+    shown[first[is_apart]] += 1
+    shown[last[is_apart] + 1] -= 1
+    is_marked: Bools = np.cumsum(shown)[:-1] > 0
+    return is_marked
 
 
 def told_in_time(clock: Clock, motion: Motion) -> Bools:

@@ -96,13 +96,13 @@ def _nearest_samples(targets: Targets, motion: Motion, row_of: Ints, reach: Floa
     vertex = np.where(to_end <= to_start, end, end - 1)
     distance = np.minimum(to_end, to_start)
     order = np.lexsort((distance, vertex))
-    found, first = np.unique(vertex[order], return_index=True)
-    nearest[found] = sample[order[first]]
+    corners, first = np.unique(vertex[order], return_index=True)
+    nearest[corners] = sample[order[first]]
     of = np.full(len(motion) + 2, -1)  # one spare at each end
     inside = distance <= 1.001 * reach[vertex] + 1e-9
     of[sample[inside] + 1] = vertex[inside]
-    at = nearest[found] + 1
-    resolved[found] = (of[at] == found) & (of[at - 1] == found) & (of[at + 1] == found)
+    at = nearest[corners] + 1
+    resolved[corners] = (of[at] == corners) & (of[at - 1] == corners) & (of[at + 1] == corners)
     return nearest, resolved
 
 

@@ -6,7 +6,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from gcode2krl.arrays import Floats
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.drawing import BLACK, BLUE, GREY, ORANGE, PALE, look, need_samples, thin, title
 from gcode2krl.report.enlarged import Trace, enlarge_places, number_places
 from gcode2krl.report.loads import (
@@ -43,7 +43,7 @@ def force_figure(toolpath: Toolpath, motion: Motion, forces: Forces) -> Figure:
     return figure
 
 
-def engaged_share(columns: Columns, phi_rad: Floats) -> Floats:
+def engaged_share(columns: TimeColumns, phi_rad: Floats) -> Floats:
     """Return (180, c) the share of each column's samples that cut at each degree from the feed normal.
 
     ``phi_rad`` (m, 2k) are the entry and exit angles of the arcs, NaN padded.

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.report.columns import COLUMNS, Columns
+from gcode2krl.report.columns import COLUMNS, TimeColumns
 from gcode2krl.report.corner_marks import shade
 from gcode2krl.report.drawing import (
     BLUE,
@@ -55,8 +55,8 @@ def joints_figure(
     if len(joints) != len(motion):
         raise ValueError(f"joints have {len(joints)} rows, the motion {len(motion)}")
     line = lines_of(toolpath, motion) if toolpath else np.zeros(len(motion), dtype=np.int32)
-    clock = Clock(motion.time_s, Columns.of(motion.time_s, COLUMNS // 3), line)
-    wide = Clock(motion.time_s, Columns.of(motion.time_s, COLUMNS // 2), line)
+    clock = Clock(motion.time_s, TimeColumns.of(motion.time_s, COLUMNS // 3), line)
+    wide = Clock(motion.time_s, TimeColumns.of(motion.time_s, COLUMNS // 2), line)
     q_deg = joints.q_rad * DEG_PER_RAD
     unreached: Bools = np.logical_not(np.isfinite(joints.q_rad).all(axis=1))
     lost, _ = intervals(motion.time_s, unreached)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from gcode2krl.arrays import Floats
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.drawing import BLUE, GREEN, ORANGE, PALE, SKY, thin
 from gcode2krl.report.signals import Clock, panel, time_axis
 
@@ -16,7 +16,7 @@ AXES = ((BLUE, "x"), (ORANGE, "y"), (GREEN, "z"))
 """Colour and name of a component."""
 
 
-def is_hatch(columns: Columns, *signals: Floats) -> bool:
+def is_hatch(columns: TimeColumns, *signals: Floats) -> bool:
     """Return whether one of the signals (m,) or vectors (m, 3) would fill its panel as a line."""
     for signal in signals:
         size = np.linalg.norm(signal, axis=1) if signal.ndim == 2 else signal

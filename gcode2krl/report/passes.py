@@ -39,11 +39,11 @@ def passes_of(z_mm: Floats, tool: Ints32, cuts: Bools, most: int = MOST_PASSES) 
             *(Pass(f"T{number}", cuts & (tool == number)) for number in named),
             Pass(f"{len(others)} other tools", cuts & np.isin(tool, others)),
         ]
-    found: list[Pass] = []
+    passes: list[Pass] = []
     for place, number in enumerate(tools):
-        room = (most - len(found)) // (len(tools) - place)
-        found += _passes_of_tool(z_mm, cuts & (tool == number), f"T{number}", room)
-    return found
+        room = (most - len(passes)) // (len(tools) - place)
+        passes += _passes_of_tool(z_mm, cuts & (tool == number), f"T{number}", room)
+    return passes
 
 
 def levels_of(z_mm: Floats, rows: Bools) -> Floats:
@@ -65,11 +65,11 @@ def _passes_of_tool(z_mm: Floats, rows: Bools, name: str, most: int) -> list[Pas
         return [Pass(name, rows)]
     bottoms = np.sort(levels)  # from the lowest
     at = np.clip(np.searchsorted(bottoms, z_mm + _GRID_MM, side="right") - 1, 0, len(bottoms) - 1)
-    found = []
+    passes = []
     for group in np.array_split(np.arange(len(bottoms))[::-1], min(len(bottoms), most)):
         depth = f"Z {bottoms[group[0]]:g}" + (f" to {bottoms[group[-1]]:g}" if len(group) > 1 else "")
-        found.append(Pass(f"{name}, {depth}", rows & np.isin(at, group)))
-    return [each for each in found if each.rows.any()]
+        passes.append(Pass(f"{name}, {depth}", rows & np.isin(at, group)))
+    return [each for each in passes if each.rows.any()]
 
 
 def overlap(images: list[Floats]) -> float:

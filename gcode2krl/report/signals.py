@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gcode2krl.arrays import Floats, Ints32
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.drawing import (
     GREY,
     PALE,
@@ -33,14 +33,14 @@ class Clock(NamedTuple):
     """What all panels over one time share."""
 
     time_s: Floats
-    columns: Columns
+    columns: TimeColumns
     line: Ints32
     """(m,) line of G-code, 0 where there is none."""
 
     @classmethod
     def of(cls, toolpath: Toolpath, motion: Motion) -> Self:
         """Return the clock of a motion."""
-        return cls(motion.time_s, Columns.of(motion.time_s), lines_of(toolpath, motion))
+        return cls(motion.time_s, TimeColumns.of(motion.time_s), lines_of(toolpath, motion))
 
     def place(self, row: int) -> str:
         """Return the time and the G-code line of a row in words."""

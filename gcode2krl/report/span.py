@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 
 _IN_COLUMN = 0.995
 """Quantile of a column's samples that counts as its largest: what is rarer is a spike in every column."""
@@ -36,7 +36,7 @@ class Span(NamedTuple):
         return outside
 
 
-def span_of(columns: Columns, values: Floats, keep: Floats | float = 0.0) -> Span:
+def span_of(columns: TimeColumns, values: Floats, keep: Floats | float = 0.0) -> Span:
     """Return the range in which the values (m,) are drawn.
 
     A side ends at its largest value. Where that is more than 4 times the usual one, it ends at 1.25 times the

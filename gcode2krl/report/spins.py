@@ -66,5 +66,5 @@ def spin_map_figure(
 def _along(values: Floats, spin_rad: Floats, chosen_rad: Floats) -> Floats:
     """Return the map's values (n,) at the nearest spins to those chosen."""
     nearest = np.abs(spin_rad[:, None] - chosen_rad).argmin(axis=0)
-    found: Floats = values[nearest, np.arange(len(chosen_rad))]
-    return found
+    shown: Floats = values[nearest, np.arange(len(chosen_rad))]
+    return shown

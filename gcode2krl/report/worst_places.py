@@ -16,17 +16,17 @@ def worst_rows(time_s: Floats, values: Floats, places: int = PLACES, half_s: flo
 
     Of a plateau it is the row where it begins.
     """
-    left = np.where(np.isfinite(values), values, 0.0)
+    remaining = np.where(np.isfinite(values), values, 0.0)
     apart_s = max(2.0 * half_s, _APART * float(time_s[-1] - time_s[0]))
     rows: list[int] = []
     for _ in range(places):
-        largest = float(left.max(initial=0.0))
+        largest = float(remaining.max(initial=0.0))
         if largest <= 0.0:
             break
-        row = int(np.argmax(left >= largest * (1.0 - 1e-6)))
+        row = int(np.argmax(remaining >= largest * (1.0 - 1e-6)))
         rows.append(row)
         start, end = np.searchsorted(time_s, (time_s[row] - apart_s, time_s[row] + apart_s))
-        left[start:end] = 0.0
+        remaining[start:end] = 0.0
     return rows
 
 

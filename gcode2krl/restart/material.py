@@ -234,8 +234,8 @@ def _entry_mm(before: _Before, left: HeightField, row: int, end_mm: Floats, cell
 def _safe_height(before: _Before, cell: Cell) -> float:
     """Return the highest of the safe heights in ``$BASE``: clearance plane, retracts, above the stock."""
     toolpath = before.toolpath
-    own = toolpath.is_position() & toolpath.rapid & ~toolpath.machine
-    heights = [float(toolpath.position_mm[own, 2].max(initial=-np.inf))]
+    rapids = toolpath.is_position() & toolpath.rapid & ~toolpath.machine
+    heights = [float(toolpath.position_mm[rapids, 2].max(initial=-np.inf))]
     if cell.clearance_z_mm is not None:
         heights.append(cell.clearance_z_mm)
     if before.left is not None:

@@ -29,14 +29,14 @@ def begun_row(toolpath: Toolpath, line: int) -> int:
     change, or runs more than once.
     """
     rows = _moving(toolpath)
-    own = rows[toolpath.source_line[rows] == line]
-    if not len(own):
+    on_line = rows[toolpath.source_line[rows] == line]
+    if not len(on_line):
         raise _without_motion(toolpath, rows, line)
-    runs = 1 + np.count_nonzero(np.diff(own) > 1)
+    runs = 1 + np.count_nonzero(np.diff(on_line) > 1)
     if runs > 1:
         sentence = f"line {line} runs {runs} times: which run is meant is not known"
         raise _refused(toolpath, line, sentence, "begin at a line that runs once")
-    row = int(own[0])
+    row = int(on_line[0])
     if not _is_ready(toolpath, row):
         raise _refused(toolpath, line, _why_not(toolpath, row), _next_ready(toolpath, rows, row))
     return row
@@ -59,10 +59,10 @@ def _next_ready(toolpath: Toolpath, rows: Ints, row: int) -> str:
     """Return the remedy that names the next line behind a row at which a program can begin."""
     lines = toolpath.source_line
     behind = (r for r in rows[rows > row].tolist() if lines[r] != lines[row] and _is_ready(toolpath, r))
-    found = next(behind, None)
-    if found is None:
+    first = next(behind, None)
+    if first is None:
         return "no line behind it can be one"
-    return f"--from-line {int(lines[found])} is the next that has a motion of its own"
+    return f"--from-line {int(lines[first])} is the next that has a motion of its own"
 
 
 def pending_change(toolpath: Toolpath, row: int) -> Event | None:
@@ -125,10 +125,10 @@ def begun_at(toolpath: Toolpath, row: int, restart: Restart, way_mm: Floats) -> 
     columns["exact_stop"][way], columns["tolerance_mm"][way] = True, np.nan
     columns["dwell_s"][: count + 1], columns["arc"][way], columns["machine"][way] = 0.0, -1, False
     in_force, left_out = _in_force(toolpath, row, 1 if count else 0)
-    rest = (e._replace(row=e.row - row + count + 1) for e in toolpath.events if e.row >= row)
+    events = (e._replace(row=e.row - row + count + 1) for e in toolpath.events if e.row >= row)
     return Toolpath(
         **columns,
-        events=(*in_force, *rest),
+        events=(*in_force, *events),
         issues=(*toolpath.issues, *left_out),
         source=toolpath.source,
         restart=replace(restart, way_rows=count),
@@ -223,8 +223,8 @@ def _without_motion(toolpath: Toolpath, rows: Ints, line: int) -> NotUnderstoodE
         last = int(lines.max(initial=0))
         sentence = f"line {line} stands behind the last line that moves the tool, {last}"
         return _refused(toolpath, line, sentence, f"--from-line {last} at most")
-    own = toolpath.source_line == line
-    what = "is a machine move (G28, G30, G53)" if toolpath.machine[own].any() else "moves nothing"
+    on_line = toolpath.source_line == line
+    what = "is a machine move (G28, G30, G53)" if toolpath.machine[on_line].any() else "moves nothing"
     first = int(np.flatnonzero(toolpath.source_line[1:] > line)[0])  # the row before the next line's
     return _refused(toolpath, line, f"line {line} {what}", _next_ready(toolpath, rows, first))
 

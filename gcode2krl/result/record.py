@@ -29,8 +29,8 @@ def record_of(
     `hashes.input_of`, ``cell`` by `hashes.cell_of`, ``files`` (name → SHA-256) by `hashes.hashes_of`.
     ``issues_file`` is the file that the findings are about if not the input: a cell, a job.
     """
-    found = tuple(issues)
-    severities = Counter[str](issue.severity for issue in found)
+    all_issues = tuple(issues)
+    severities = Counter[str](issue.severity for issue in all_issues)
     hashes = dict(files or {})
     return {
         "schema": SCHEMA,
@@ -44,7 +44,7 @@ def record_of(
         "files": list(hashes),
         "sha256": {name: content for name, content in hashes.items() if content is not None},
         **figures,
-        "issues": issue_dicts(found, issues_file),
+        "issues": issue_dicts(all_issues, issues_file),
     }
 
 

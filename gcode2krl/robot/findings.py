@@ -166,8 +166,8 @@ def _load_findings(targets: Targets, cell: Cell) -> Iterator[Issue]:
     for number, load in loads.values():
         if rated is None or load.mass_kg is None or load.mass_kg <= rated:
             continue
-        own = load is not cell.load
-        whose, key = (f" with T{number}", f"[tool.{number}] load") if own else ("", "[load]")
+        is_of_tool = load is not cell.load
+        whose, key = (f" with T{number}", f"[tool.{number}] load") if is_of_tool else ("", "[load]")
         sentence = f"the load of {load.mass_kg:g} kg{whose} is above the rated {rated:g} kg"
         yield Issue("error", "overload", 0, sentence, f"correct {key}")
 

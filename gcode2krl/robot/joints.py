@@ -246,14 +246,14 @@ def _along_lines(targets: Targets, counts: Ints, branch: Branch, cell: Cell) -> 
         q[start:end], wrong[start:end] = np.nan, 0
         line, shared = _with_row_before(targets, counts, start, end, cell)
         guess = branch.guess(int(counts[start]) - 1) if before is None else before
-        found = branch.joints(path_of(line, cell), cell, guess)
-        bits = what_is_wrong(found, line.duration_s, cell)[shared:]
-        target, found_own = line.target[shared:], found[shared:]
+        solution = branch.joints(path_of(line, cell), cell, guess)
+        bits = what_is_wrong(solution, line.duration_s, cell)[shared:]
+        target, found_own = line.target[shared:], solution[shared:]
         hits = np.flatnonzero(bits)
         np.bitwise_or.at(wrong, target[hits], bits[hits])
         ends = line.is_target[shared:]
         q[target[ends]] = found_own[ends]
-        return found[0].copy() if shared else np.full(6, np.nan)  # a view would keep all rows
+        return solution[0].copy() if shared else np.full(6, np.nan)  # a view would keep all rows
 
     _solve_parts(solve, q, chunk_borders(len(targets)), cell.home_q_rad())
     q[targets.home] = cell.home_q_rad()

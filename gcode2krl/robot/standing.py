@@ -80,11 +80,11 @@ def raise_shares(share: Floats, qd_rad_s: Floats, row: Ints32, cell: Cell) -> No
     if speeds is None or not len(row):
         return
     first = int(row.min())
-    found = np.zeros(int(row.max()) + 1 - first)
+    counts = np.zeros(int(row.max()) + 1 - first)
     most = shaped("most", np.array(speeds) * RAD_PER_DEG, 6)
-    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row - first), found)
-    part = share[first : first + len(found)]
-    np.maximum(part, found, out=part)
+    _speed_share(shaped("qd_rad_s", qd_rad_s, -1, 6), most, np.ascontiguousarray(row - first), counts)
+    part = share[first : first + len(counts)]
+    np.maximum(part, counts, out=part)
 
 
 def _judged(q_rad: Floats, duration_s: Floats, cell: Cell) -> tuple[Floats, Bits]:

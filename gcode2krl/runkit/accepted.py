@@ -187,12 +187,12 @@ def _tools(program: KrlProgram, path: Path, cell: Cell) -> tuple[tuple[Event, ..
     """Return the tool changes and the tool (p,) of each motion."""
     changes: list[Event] = []
     for file, number, text in _comments(program):
-        found = _CODE.match(text)
-        if found is None or found[2] != "M6" or found[3] is None:
+        match = _CODE.match(text)
+        if match is None or match[2] != "M6" or match[3] is None:
             continue
         later = np.flatnonzero((program.file_of == file) & (program.line > number))
         row = int(later[np.argmin(program.line[later])]) - 1 if len(later) else len(program.ptp) - 1
-        values = {"tool": int(found[3][1:]), "line": int(found[1] or 0)}
+        values = {"tool": int(match[3][1:]), "line": int(match[1] or 0)}
         changes.append(Event(row, "tool", values))
     changes.sort(key=lambda event: event.row)
     tool = np.full(len(program.ptp), _first_tool(program, changes, path, cell), dtype=np.int32)
@@ -268,10 +268,10 @@ def _source_lines(program: KrlProgram) -> Ints32:
         if (found := _LINE.match(text))
     ]
     for file in range(len(program.file)):
-        own = np.array([(number, line) for at, number, line in marks if at == file]).reshape(-1, 2)
+        own_marks = np.array([(number, line) for at, number, line in marks if at == file]).reshape(-1, 2)
         rows = np.flatnonzero(program.file_of == file)
-        before = np.searchsorted(own[:, 0], program.line[rows]) - 1
-        lines[rows] = np.where(before >= 0, own[np.maximum(before, 0), 1] if len(own) else 0, 0)
+        before = np.searchsorted(own_marks[:, 0], program.line[rows]) - 1
+        lines[rows] = np.where(before >= 0, own_marks[np.maximum(before, 0), 1] if len(own_marks) else 0, 0)
     return lines
 
 

@@ -101,8 +101,8 @@ def read_data_set(path: str | Path) -> DataSet:
         for block, values in zip(blocks, columns, strict=True)
     ]
     time_s, used = _time(file, clocks, channels, rows)
-    rest = tuple(channel for channel in channels if channel is not used)
-    return DataSet(file, comment, time_s, rest, tuple(issues))
+    others = tuple(channel for channel in channels if channel is not used)
+    return DataSet(file, comment, time_s, others, tuple(issues))
 
 
 def _read_header(file: Path) -> tuple[str, list[_Block]]:

@@ -205,7 +205,7 @@ def at(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
     return np.stack([np.interp(times_s, own_s, column) for column in values.T], axis=1)
 
 
-class Course(NamedTuple):
+class PathCourse(NamedTuple):
     """The moving part of a path as points at equal times, with speed and direction."""
 
     position: Floats
@@ -218,7 +218,7 @@ class Course(NamedTuple):
     """(n,) True where the speed changes by less than 5 % within ± 0.16 s."""
 
 
-def course(time_s: Floats, position: Floats, most: int) -> Course:
+def course(time_s: Floats, position: Floats, most: int) -> PathCourse:
     """Return the moving part of a path, at most ``most`` points; speeds are those over 0.16 s."""
     grid = np.arange(time_s[0], time_s[-1], _GRID_S)
     if len(grid) < _LEAST_GRID:
@@ -233,7 +233,7 @@ def course(time_s: Floats, position: Floats, most: int) -> Course:
     chosen = moving[:: max(1, math.ceil(len(moving) / most))]
     with np.errstate(invalid="ignore"):
         direction = np.nan_to_num(velocity[chosen] / speed[chosen, None])
-    return Course(points[chosen], speed[chosen], direction, steady[chosen])
+    return PathCourse(points[chosen], speed[chosen], direction, steady[chosen])
 
 
 def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:

@@ -144,8 +144,8 @@ def _from_csv(file: Path) -> Sheet:
     columns["t_s"] = (ipoc - (known[0] if len(known) else 0.0)) / MS_PER_S
     issues = tuple(_findings(file, columns, 0, 0))
     columns.pop("delay", None)
-    rest = tuple(name for name in sheet.names if name not in wanted)
-    return Sheet(columns, (*columns, *rest), sheet.first_row, str(file), issues)
+    others = tuple(name for name in sheet.names if name not in wanted)
+    return Sheet(columns, (*columns, *others), sheet.first_row, str(file), issues)
 
 
 def _header(file: Path) -> list[str]:

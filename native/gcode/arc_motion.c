@@ -6,7 +6,6 @@
 #include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
-#include "gcode/settings.h"
 
 enum { MOST_MISFITS = 10 };        /* arcs whose lines are kept */
 enum { MOST_TURNS = 1000 };
@@ -206,30 +205,6 @@ static void note_spiral(Block *b, const Arc *arc) {
 }
 
 /* --- the chords ---------------------------------------------------------------------------------------- */
-
-/* Write the rows of an arc; the last ends exactly where the block says. */
-void emit_chords(Block *b, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s) {
-    State *s = b->state;
-    const double from_deg[3] = {s->rotary_deg[0], s->rotary_deg[1], s->rotary_deg[2]};
-    const double time_s = compensates(s) ? NAN : feed_time_s(b, INFINITY, chords);
-    double at_mm[3];
-    for (int64_t k = 1; k <= chords; k++) {
-        const double part = (double)k / (double)chords;
-        const double r = arc->from_radius_mm + (arc->to_radius_mm - arc->from_radius_mm) * part;
-        at_mm[arc->first] = arc->centre.u + r * cos(angle + sweep * part);
-        at_mm[arc->second] = arc->centre.v + r * sin(angle + sweep * part);
-        at_mm[arc->third] = arc->from_w + (arc->to_w - arc->from_w) * part;
-        stand_at(s, k == chords ? arc->to_mm : at_mm);
-        stand_turned_between(s, from_deg, b->turn_deg, part);
-        emit(b->machine, b->line, mm_s, false, false, s->arcs);
-        note_time(b, time_s);
-    }
-    const double side = sweep < 0.0 ? -1.0 : 1.0, radius_mm = distance(arc->to, arc->centre);
-    s->arc_end[0] = -side * (arc->to.v - arc->centre.v) / radius_mm;
-    s->arc_end[1] = side * (arc->to.u - arc->centre.u) / radius_mm;
-    s->arc_end_rows = b->counts->rows;
-    s->arcs++;
-}
 
 /* Write an arc whose radii fit; return false, with nothing written, where there is no room for its rows. */
 static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {

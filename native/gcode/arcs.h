@@ -19,6 +19,15 @@ typedef struct {
     double u, v;
 } Point;
 
+/* An arc: its axes in the order u, v, w, its ends, its centre, and on what it rests that may be in doubt. */
+typedef struct {
+    int first, second, third;
+    Point from, to, centre;
+    double from_w, to_w, to_mm[3];
+    double from_radius_mm, to_radius_mm;
+    int32_t rests_on;
+} Arc;
+
 Fit radii_fit(double start_mm, double end_mm, double unit_mm);
 int centre_from_radius(Point start, Point end, double radius, bool ccw, Point *centre);
 double sweep_angle(Point start, Point end, Point centre, bool ccw, int64_t turns, double *from_rad);

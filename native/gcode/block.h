@@ -51,9 +51,23 @@ typedef struct {
 static const int OTHER_AXES[] = V_OTHER_AXES;
 enum { OTHER_AXES_COUNT = sizeof OTHER_AXES / sizeof *OTHER_AXES };
 
+enum { NOT_WHOLE = -1 };
+
+/* Return the value of a word as a whole number 0…99999, or NOT_WHOLE. */
+static inline int32_t whole(double value) {
+    static const double SLACK = 1e-6, LARGEST = 99999.0;
+    const double nearest = rint(value);
+    return fabs(value - nearest) > SLACK || nearest < 0.0 || nearest > LARGEST ? NOT_WHOLE : (int32_t)nearest;
+}
+
 /* Tool length offset in force, 0 under G49. */
 static inline double length_offset_of(const State *s) {
     return isnan(s->length_offset) ? 0.0 : s->length_offset;
+}
+
+/* Tell whether moves are shifted: compensation by a radius of 0 is on and moves nothing. */
+static inline bool compensates(const State *s) {
+    return s->cutter_mode & S_CUTTER_ON && s->cutter_radius_mm > 0.0;
 }
 
 #endif

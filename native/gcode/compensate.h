@@ -3,12 +3,8 @@
 #ifndef GCODE_COMPENSATE_H
 #define GCODE_COMPENSATE_H
 
-#include "gcode/arc_motion.h"
-
-/* Tell whether moves are shifted: compensation by a radius of 0 is on and moves nothing. */
-static inline bool compensates(const State *s) {
-    return s->cutter_mode & S_CUTTER_ON && s->cutter_radius_mm > 0.0;
-}
+#include "gcode/arcs.h"
+#include "gcode/block.h"
 
 void end_compensation(Block *block);
 void stand_beside(State *s);

@@ -5,7 +5,6 @@
 #include "gcode/compensate.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
-#include "gcode/settings.h"
 #include "gcode/tool_lengths.h"
 
 /* From this difference on the diameter is not that of the tool in the spindle. */

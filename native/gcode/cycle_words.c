@@ -2,13 +2,11 @@
 
 #include "gcode/cycle_words.h"
 
-#include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/motion.h"
 #include "gcode/polar.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
-#include "gcode/settings.h"
 
 static const double CLEARANCE_MM = 0.254; /* LinuxCNC's, 0.010 inch */
 static const double SAME_HEIGHT = 1e-9;  /* heights closer than this differ by rounding: unit, work offset */

@@ -22,7 +22,6 @@ void go_along(Block *block, const Cycle *cycle, double along, bool known, double
 void wait_here(Block *block, double seconds);
 void turn_spindle(Block *block, const Cycle *cycle, int32_t direction);
 bool has_cycle_room(Block *block, int64_t rows, int64_t events);
-bool drill_here(Block *block, const Cycle *cycle);
 bool cycle_words(Block *block, Cycle *cycle);
 void learn_across(Block *block, const Cycle *cycle);
 void remember_cycle(Block *block, const Cycle *cycle);

@@ -5,7 +5,6 @@
 
 #include "gcode/cycles.h"
 
-#include "gcode/cycle_words.h"
 #include "gcode/feed.h"
 #include "gcode/motion.h"
 #include "gcode/polar.h"

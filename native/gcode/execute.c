@@ -9,21 +9,6 @@
 #include "gcode/machine.h"
 #include "gcode/program_line.h"
 
-/* Execute a block that calls nothing; return the word at which to go on. */
-int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
-    Counts *counts = run->machine->counts.at;
-    const State *s = run->machine->state.at;
-    const int64_t first_row = counts->rows + s->cutter_rows_removed, first_event = counts->events;
-    counts->marks = counts->program_wanted = 0;
-    if (!run_block(run->machine, words, from, to))
-        return counts->program_wanted ? stop_with(run, F_O_WORD, PF_FAULT_NOT_FIRST, next) : WAIT;
-    name_caller(run, first_row - s->cutter_rows_removed, first_event);
-    if (counts->rows > run->course->most_rows)
-        return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
-    run->course->changes += writes_tables(words, from, to);
-    return next;
-}
-
 /* Execute a block whose words are known; return the word at which to go on. */
 static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
     const bool deletable = AT(words->letter, from) == '/';
@@ -72,7 +57,13 @@ static int64_t marked_line(Run *run, int64_t row, int64_t next) {
     const MarkedLine *marked = &AT(run->program->lines, row);
     if (is_deleted(run->machine, run->program->text, marked->start))
         return next;
-    return marked->kind == P_KIND_BLOCK ? computed_block(run, marked, next) : flow(run, marked, next);
+    if (marked->kind == P_KIND_BLOCK)
+        return computed_block(run, marked, next);
+    if (run->machine->counts.at->errors > 0) { /* where to go on may depend on what was wrong */
+        run->course->is_stopped = 1;
+        return next;
+    }
+    return is_of_macro(marked->kind) ? macro_flow(run, marked, next) : flow(run, marked, next);
 }
 
 /* Execute a program from a word on; return the word at which to go on where room or a subprogram is wanted. */

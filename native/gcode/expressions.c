@@ -238,16 +238,6 @@ double open_value(Evaluation *e, int64_t *i) {
 
 /* --- values --------------------------------------------------------------------------------------------- */
 
-/* Find the whole number that a value stands for; LinuxCNC lets it be off by 0.0001. */
-bool whole_number(double value, int64_t *number) {
-    static const double SLACK = 0.0001, LARGEST = 1e9;
-    const double below = floor(value), part = value - below;
-    if (!(fabs(value) < LARGEST) || (part > SLACK && part <= 1.0 - SLACK))
-        return false;
-    *number = (int64_t)below + (part > 0.5);
-    return true;
-}
-
 /* Return the number of the parameter whose # stands before i, which goes behind it; 0 where it is none. */
 static int64_t parameter_number(Evaluation *e, int64_t *i) {
     const int64_t place = *i;
@@ -263,6 +253,34 @@ static int64_t parameter_number(Evaluation *e, int64_t *i) {
         return 0;
     }
     return number;
+}
+
+/* Return the number of a Fanuc's variable, as `parameter_number` does; 0 for #0 too. */
+static int64_t number_of_variable(Evaluation *e, int64_t *i, int64_t place) {
+    if (*i < e->end && AT(e->program->text, *i) == '<') {
+        wrong(e, F_EXPRESSION, PF_MACRO_NAME, 0.0, place);
+        return 0;
+    }
+    const bool in_word = e->in_word;
+    e->in_word = false;
+    const double value = value_at(e, i);
+    e->in_word = in_word;
+    return e->finding == F_OK ? variable_number(e, value, place) : 0;
+}
+
+/* Read a Fanuc's variable whose # stands at i. */
+static double variable_at(Evaluation *e, int64_t *i) {
+    const int64_t place = *i;
+    *i = after_blanks(e->program->text, *i + 1, e->end);
+    const int64_t number = number_of_variable(e, i, place);
+    e->is_null = e->finding == F_OK && number == 0;
+    if (e->finding != F_OK || number == 0)
+        return 0.0;
+    const double value = AT(e->program->parameters, number);
+    if (isnan(value))
+        note_unset(e, number);
+    e->is_null = isnan(value) || isinf(value);
+    return e->is_null ? 0.0 : value;
 }
 
 /* Read the parameter whose # stands at i: its value, or whether there is one. */
@@ -416,7 +434,7 @@ void assignment_at(Evaluation *e, int64_t *i) {
     Assignment made = {NO_NAME, 0, 0.0};
     *i = after_blanks(text, *i + 1, e->end);
     if (is_macro(e))
-        made.number = variable_number(e, i, place);
+        made.number = number_of_variable(e, i, place);
     else if (*i < e->end && AT(text, *i) == '<')
         made.name = name_at(e, i);
     else

@@ -14,7 +14,6 @@ double tangent(double degrees);
 double degrees(double radian);
 double value_at(Evaluation *e, int64_t *i);
 double bracket_at(Evaluation *e, int64_t *i);
-bool whole_number(double value, int64_t *number);
 void assignment_at(Evaluation *e, int64_t *i);
 
 #endif

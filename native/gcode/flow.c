@@ -3,7 +3,6 @@
 #include "gcode/flow.h"
 
 #include "gcode/expressions.h"
-#include "gcode/macro_flow.h"
 #include "gcode/program_line.h"
 #include "gcode/machine.h"
 #include "gcode/reporting.h"
@@ -416,10 +415,6 @@ static int64_t end_of_file(Run *run, int64_t next) {
 
 /* Execute an O-line; return the word at which to go on. */
 int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
-    if (run->machine->counts.at->errors > 0) { /* where to go on may depend on what was wrong */
-        run->course->is_stopped = 1;
-        return next;
-    }
     switch (marked->kind) {
     case P_KIND_IF: return branch(run, marked, next);
     case P_KIND_ELSEIF:
@@ -435,14 +430,40 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_RETURN: return return_from(run, marked, next);
     case P_KIND_SUB: return define(run, marked, next);
     case P_KIND_END_OF_FILE: return end_of_file(run, next);
-    case P_KIND_GOTO: return go_to_number(run, marked, next);
-    case P_KIND_MACRO_IF: return macro_if(run, marked, next);
-    case P_KIND_MACRO_WHILE: return macro_while(run, marked, next);
     case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
     case P_KIND_FOR: return begin_counting(run, marked, next);
     case P_KIND_ENDFOR: return count_on(run, marked, next);
     case P_KIND_SECTION: return repeat_section(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
+    return next;
+}
+
+/* --- blocks --------------------------------------------------------------------------------------------- */
+
+/* Tell whether a block writes into a table that is kept beside the modes: offsets, saved modes. */
+static bool writes_tables(const Words *words, int64_t from, int64_t to) {
+    for (int64_t k = from; k < to; k++) {
+        const double value = AT(words->value, k);
+        if (AT(words->letter, k) == 'G' && value >= V_G10 / V_TENFOLD && value < V_G10 / V_TENFOLD + 1.0)
+            return true;
+        if (AT(words->letter, k) == 'M' && value >= V_M70 && value <= V_M73)
+            return true;
+    }
+    return false;
+}
+
+/* Execute a block that calls nothing; return the word at which to go on. */
+int64_t block_of_words(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
+    Counts *counts = run->machine->counts.at;
+    const State *s = run->machine->state.at;
+    const int64_t first_row = counts->rows + s->cutter_rows_removed, first_event = counts->events;
+    counts->marks = counts->program_wanted = 0;
+    if (!run_block(run->machine, words, from, to))
+        return counts->program_wanted ? stop_with(run, F_O_WORD, PF_FAULT_NOT_FIRST, next) : WAIT;
+    name_caller(run, first_row - s->cutter_rows_removed, first_event);
+    if (counts->rows > run->course->most_rows)
+        return stop_with(run, F_TOO_MANY_ROWS, (double)counts->rows, next);
+    run->course->changes += writes_tables(words, from, to);
     return next;
 }

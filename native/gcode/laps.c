@@ -44,15 +44,3 @@ bool repeats_itself(Run *run, int64_t word) {
     *kept = without_records(state);
     return false;
 }
-
-/* Tell whether a block writes into a table that is kept beside the modes: offsets, saved modes. */
-bool writes_tables(const Words *words, int64_t from, int64_t to) {
-    for (int64_t k = from; k < to; k++) {
-        const double value = AT(words->value, k);
-        if (AT(words->letter, k) == 'G' && value >= V_G10 / V_TENFOLD && value < V_G10 / V_TENFOLD + 1.0)
-            return true;
-        if (AT(words->letter, k) == 'M' && value >= V_M70 && value <= V_M73)
-            return true;
-    }
-    return false;
-}

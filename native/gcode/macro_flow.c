@@ -53,7 +53,7 @@ static int64_t go_to(Run *run, const MarkedLine *marked, Evaluation *e, int64_t 
     return label->word;
 }
 
-int64_t go_to_number(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t go_to_number(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     return go_to(run, marked, &e, marked->expression, next);
 }
@@ -73,7 +73,7 @@ static int64_t calculate(Run *run, const MarkedLine *marked, Evaluation *e, int6
 }
 
 /* IF [...] GOTO n, IF [...] THEN #1 = 2. */
-int64_t macro_if(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t macro_if(Run *run, const MarkedLine *marked, int64_t next) {
     const Bytes text = run->program->text;
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
@@ -90,7 +90,7 @@ int64_t macro_if(Run *run, const MarkedLine *marked, int64_t next) {
 }
 
 /* WHILE [...] DO1: behind END1 where the test fails. */
-int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
     const double test = bracket_value(&e, &i);
@@ -99,6 +99,15 @@ int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next) {
     if (e.finding != F_OK)
         return stop_wrong(run, &e, marked->start, next);
     return test != 0.0 ? next : jump(run, marked->target);
+}
+
+/* Execute a jump, a test or a loop; return the word at which to go on. */
+int64_t macro_flow(Run *run, const MarkedLine *marked, int64_t next) {
+    switch (marked->kind) {
+    case P_KIND_GOTO: return go_to_number(run, marked, next);
+    case P_KIND_MACRO_IF: return macro_if(run, marked, next);
+    default: return macro_while(run, marked, next);
+    }
 }
 
 /* --- G65 ------------------------------------------------------------------------------------------------ */

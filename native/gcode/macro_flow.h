@@ -5,9 +5,11 @@
 
 #include "gcode/flow.h"
 
-int64_t go_to_number(Run *run, const MarkedLine *marked, int64_t next);
-int64_t macro_if(Run *run, const MarkedLine *marked, int64_t next);
-int64_t macro_while(Run *run, const MarkedLine *marked, int64_t next);
+static inline bool is_of_macro(int32_t kind) {
+    return kind == P_KIND_GOTO || kind == P_KIND_MACRO_IF || kind == P_KIND_MACRO_WHILE;
+}
+
+int64_t macro_flow(Run *run, const MarkedLine *marked, int64_t next);
 int64_t macro_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next);
 
 #endif

@@ -6,8 +6,6 @@
 
 #include "gcode/macro_values.h"
 
-#include "gcode/expressions.h"
-
 static const double NEAR = 1e-6;          /* share in which numbers that are compared must differ, or be equal */
 static const double MOST_BITS = 4294967295.0; /* 32 bits */
 
@@ -27,41 +25,14 @@ static int fault_of(int64_t number) {
     return number >= P_MACRO_END ? PF_MACRO_OF_CONTROL : PF_MACRO_UNKNOWN;
 }
 
-/* Return the number of the variable whose # stands at `place`, before i, which goes behind it; 0 for #0 and where it
-   is wrong. */
-int64_t variable_number(Evaluation *e, int64_t *i, int64_t place) {
-    const Bytes text = e->program->text;
+/* Return the number of a variable that an expression names; 0 for #0 and where it is wrong. */
+int64_t variable_number(Evaluation *e, double value, int64_t place) {
     int64_t number = 0;
-    if (*i < e->end && AT(text, *i) == '<') {
-        wrong(e, F_EXPRESSION, PF_MACRO_NAME, 0.0, place);
-        return 0;
-    }
-    const bool in_word = e->in_word;
-    e->in_word = false;
-    const double value = value_at(e, i);
-    e->in_word = in_word;
-    if (e->finding != F_OK)
-        return 0;
     if (!whole_number(value, &number))
         wrong(e, F_PARAMETER_NUMBER, value, 0.0, place);
     else if (number < 0 || !is_variable(number))
         wrong(e, F_EXPRESSION_VALUE, fault_of(number), (double)number, place);
     return e->finding == F_OK ? number : 0;
-}
-
-/* Read the variable whose # stands at i. */
-double variable_at(Evaluation *e, int64_t *i) {
-    const int64_t place = *i;
-    *i = after_blanks(e->program->text, *i + 1, e->end);
-    const int64_t number = variable_number(e, i, place);
-    e->is_null = e->finding == F_OK && number == 0;
-    if (e->finding != F_OK || number == 0)
-        return 0.0;
-    const double value = AT(e->program->parameters, number);
-    if (isnan(value))
-        note_unset(e, number);
-    e->is_null = isnan(value) || isinf(value);
-    return e->is_null ? 0.0 : value;
 }
 
 /* --- operators ------------------------------------------------------------------------------------------ */

@@ -19,8 +19,7 @@ typedef struct {
 static inline bool is_comparison(Kind kind) { return kind >= EQ && kind <= LE; }
 static inline bool is_macro_operator(Kind kind) { return kind == MODULO || kind >= EQ; }
 
-int64_t variable_number(Evaluation *e, int64_t *i, int64_t place);
-double variable_at(Evaluation *e, int64_t *i);
+int64_t variable_number(Evaluation *e, double value, int64_t place);
 double apply_in_macro(Evaluation *e, Kind kind, const Operands *two, int64_t place);
 
 #endif

@@ -4,7 +4,6 @@
 
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
-#include "gcode/settings.h"
 #include "gcode/tool_lengths.h"
 
 enum { WORK_OFFSETS = 9, ALL_OF_X_AND_Y = 3 };

@@ -39,4 +39,20 @@ bool takes_axes(const Block *b, bool any_axis);
 void offset_codes(Block *b, bool any_axis);
 void shift_by_code(Block *b);
 
+/* Where the programmed numbers have their zero: work offset and shift. */
+static inline const double *work_offset_mm(const Block *block) { return block->state->base_mm; }
+
+/* The tip at programmed coordinates, and the other way round; both may be one array. */
+static inline void tip_of(const Block *block, const double programmed_mm[3], double tip_mm[3]) {
+    const double *base_mm = work_offset_mm(block);
+    for (int axis = 0; axis < 3; axis++)
+        tip_mm[axis] = programmed_mm[axis] + base_mm[axis];
+}
+
+static inline void programmed_of(const Block *block, const double tip_mm[3], double programmed_mm[3]) {
+    const double *base_mm = work_offset_mm(block);
+    for (int axis = 0; axis < 3; axis++)
+        programmed_mm[axis] = tip_mm[axis] - base_mm[axis];
+}
+
 #endif

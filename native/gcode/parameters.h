@@ -85,4 +85,14 @@ bool is_name_set(const Evaluation *e, int64_t name);
 double named_parameter(const Evaluation *e, int64_t name);
 void assign(Program *program);
 
+/* Find the whole number that a value stands for; LinuxCNC lets it be off by 0.0001. */
+static inline bool whole_number(double value, int64_t *number) {
+    static const double SLACK = 0.0001, LARGEST = 1e9;
+    const double below = floor(value), part = value - below;
+    if (!(fabs(value) < LARGEST) || (part > SLACK && part <= 1.0 - SLACK))
+        return false;
+    *number = (int64_t)below + (part > 0.5);
+    return true;
+}
+
 #endif

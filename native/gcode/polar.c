@@ -2,8 +2,10 @@
 
 #include "gcode/polar.h"
 
+#include "gcode/offsets.h"
 #include "gcode/reporting.h"
-#include "gcode/rows.h"
+
+static const double POLAR_ZERO_MM = 1e-9; /* nearer to the zero there is no direction */
 
 /* Move a programmed point as the polar words say; what is not named stays, G91 adds. */
 void polar_point(const Block *b, double programmed_mm[2]) {

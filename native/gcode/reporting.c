@@ -2,15 +2,21 @@
 
 #include "gcode/reporting.h"
 
+static bool is_warning(int32_t number) {
+    static const int32_t warnings[] = F_WARNINGS;
+    for (size_t k = 0; k < sizeof warnings / sizeof *warnings; k++)
+        if (warnings[k] == number)
+            return true;
+    return false;
+}
+
 /* Keep a finding of a line, unless its block has been reported already. */
 void report_at(Block *block, int32_t line, int32_t number, Says says) {
     Counts *counts = block->counts;
     if (counts->mute)
         return;
     const FoundView found = block->machine->found;
-    const bool warning = number == F_TOOL_UNDECLARED || number == F_H_DIFFERS || number == F_OFFSET_UNKNOWN ||
-                         number == FO_FROM_UNKNOWN || number == FO_AT_START || number == FO_LENGTH_DIFFERS ||
-                         number == F_CUTTER_DIFFERS;
+    const bool warning = is_warning(number);
     counts->errors += !warning;
     const int64_t room = warning ? found.rows / 2 : found.rows; /* warnings never crowd out an error */
     if (counts->findings < room)

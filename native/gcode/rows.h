@@ -1,13 +1,13 @@
-/* Rows of straight moves, and where the axis words of a block lead. */
+/* Rows of straight moves, those of an arc among them, and where the axis words of a block lead. */
 
 #ifndef GCODE_ROWS_H
 #define GCODE_ROWS_H
 
+#include "gcode/arcs.h"
 #include "gcode/offsets.h"
 #include "gcode/rotary.h"
 
 enum { NO_ARC = -1 };
-static const double POLAR_ZERO_MM = 1e-9; /* nearer to the zero there is no direction */
 static const double RAPID_MM_S = INFINITY;
 
 /* Write what the rotation of the work offset makes of a row. */
@@ -79,24 +79,9 @@ static inline void stand_at(State *s, const double position_mm[3]) {
     s->z = position_mm[2];
 }
 
-/* Where the programmed numbers have their zero: work offset and shift. */
-static inline const double *work_offset_mm(const Block *block) { return block->state->base_mm; }
-
-/* The tip at programmed coordinates, and the other way round; both may be one array. */
-static inline void tip_of(const Block *block, const double programmed_mm[3], double tip_mm[3]) {
-    const double *base_mm = work_offset_mm(block);
-    for (int axis = 0; axis < 3; axis++)
-        tip_mm[axis] = programmed_mm[axis] + base_mm[axis];
-}
-
-static inline void programmed_of(const Block *block, const double tip_mm[3], double programmed_mm[3]) {
-    const double *base_mm = work_offset_mm(block);
-    for (int axis = 0; axis < 3; axis++)
-        programmed_mm[axis] = tip_mm[axis] - base_mm[axis];
-}
-
 void target(const Block *block, double to_mm[3]);
 void learn(Block *block);
 void follow(Block *block);
+void emit_chords(Block *block, const Arc *arc, double angle, double sweep, int64_t chords, double mm_s);
 
 #endif

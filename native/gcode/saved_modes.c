@@ -10,7 +10,6 @@
 #include "gcode/cycles.h"
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
-#include "gcode/settings.h"
 #include "gcode/tool_lengths.h"
 
 static Modes *modes_of(const Machine *machine) { return &AT(machine->saved, machine->state.at->level); }

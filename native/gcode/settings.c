@@ -10,17 +10,6 @@
 #include "gcode/saved_modes.h"
 #include "gcode/tool_lengths.h"
 
-enum { LARGEST_WHOLE = 99999 };
-static const double WHOLE_SLACK = 1e-6;
-
-/* Return a whole number 0…99999, or NOT_WHOLE. */
-int32_t whole(double value) {
-    const double nearest = rint(value);
-    if (fabs(value - nearest) > WHOLE_SLACK || nearest < 0 || nearest > LARGEST_WHOLE)
-        return NOT_WHOLE;
-    return (int32_t)nearest;
-}
-
 /* Tell whether an M-code stops or ends the program. */
 bool stops(int32_t m) { return m == V_M0 || m == V_M1 || m == V_M2 || m == V_M30 || m == V_M60; }
 

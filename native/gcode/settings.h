@@ -5,8 +5,6 @@
 
 #include "gcode/block.h"
 
-enum { NOT_WHOLE = -1 };
-int32_t whole(double value);
 bool stops(int32_t m);
 void apply_settings(Block *block);
 

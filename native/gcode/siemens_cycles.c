@@ -9,7 +9,7 @@
 
 #include "gcode/compensate.h"
 #include "gcode/cutter_settings.h"
-#include "gcode/cycle_words.h"
+#include "gcode/cycles.h"
 #include "gcode/feed.h"
 #include "gcode/motion.h"
 #include "gcode/reporting.h"

@@ -5,7 +5,6 @@
 #include "gcode/offsets.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
-#include "gcode/settings.h"
 
 enum { FIXTURE = 8 }; /* G59.3, in which G10 L11 measures */
 static const double LENGTH_SLACK_MM = 1e-3; /* rounding of a length in three decimals */

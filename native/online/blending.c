@@ -1,4 +1,4 @@
-/* Blends the measured force with the pilot's estimate (online/blending.py; Haehn & Weigold 2020, section 2.3). */
+/* Blends the measured force with the pilot's estimate (online/compensator.py; Haehn & Weigold 2020, section 2.3). */
 
 #include "constants.h"
 #include "core.h"

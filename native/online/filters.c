@@ -1,4 +1,4 @@
-/* Low-pass and moving average of a sensor's loads (online/filters.py). */
+/* Low-pass and moving average of a sensor's loads (online/compensator.py). */
 
 #include "core.h"
 

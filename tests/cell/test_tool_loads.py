@@ -5,7 +5,7 @@ import pytest
 
 from gcode2krl import Gcode2KrlError, set_targets, write_krl
 from gcode2krl.cli.cell_list import missing_keys, to_confirm
-from gcode2krl.effects.masses import bodies_of
+from gcode2krl.effects.inputs import bodies_of
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.statements import tool_statements
 from gcode2krl.runkit.checklist import _tool_lines

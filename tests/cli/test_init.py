@@ -12,7 +12,7 @@ from examples import make_cells
 from gcode2krl import load_cell
 from gcode2krl.cell.setup.answers import completed, read_answers
 from gcode2krl.cell.setup.cell_text import text_of_cell
-from gcode2krl.cell.setup.controller import Controller, read_controller
+from gcode2krl.cell.setup.controller import ArchivedController, read_controller
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, TOOL_QUESTIONS
 from gcode2krl.cli.init import SCHEMA
 from gcode2krl.cli.init_dialogue import ask, questions_text
@@ -22,7 +22,7 @@ from tests.conftest import ROOT
 
 FOLDER = ROOT / "examples" / "cells"
 CELLS = sorted(FOLDER.glob("*.toml"))
-NOBODY = Controller(source="")
+NOBODY = ArchivedController(source="")
 SIX = {"spindle_on_digital_output", "spindle_on_analog_output", "tool_magazine", "change_by_hand"}
 SIX |= {"upright_without_rail", "upside_down"}
 STRANGERS = ["spindle_on_digital_output", "spindle_on_analog_output", "tool_magazine"]

@@ -15,7 +15,7 @@ from gcode2krl.cell import as_toml, cell_from_resolved
 from gcode2krl.cli.main import commands
 from gcode2krl.cli.record_head import Heading
 from gcode2krl.gcode import CHORD_TOLERANCE_MM
-from gcode2krl.prediction.head import CHORD_MM
+from gcode2krl.prediction.bundle import CHORD_MM
 from gcode2krl.result import cell_of
 from tests.cli.test_translate import CLEAN
 from tests.conftest import ROOT

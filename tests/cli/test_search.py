@@ -5,7 +5,7 @@ import json
 import pytest
 
 from gcode2krl.batch.cluster import make_shipped, pack
-from gcode2krl.batch.parts import Part
+from gcode2krl.batch.parts import BatchPart
 from gcode2krl.batch.planning import plan
 from gcode2krl.batch.work import Task, make
 from gcode2krl.gcode.dependencies import possible_files
@@ -47,7 +47,7 @@ def test_folders_may_be_several_and_must_be_there(run, part, tmp_path):
 
 def test_a_batch_finds_them_and_takes_a_changed_one_for_a_changed_part(run, part, tmp_path):
     def key():
-        (planned,) = plan([Part(part.name, part)], Order("", search=(str(tmp_path / "macros"),)))
+        (planned,) = plan([BatchPart(part.name, part)], Order("", search=(str(tmp_path / "macros"),)))
         return planned.key
 
     done = run("batch", part, "-o", "out", "--search", "macros", "--no-cache", "--processes", "1")

@@ -9,7 +9,7 @@ from gcode2krl.cell.carried import standing
 from gcode2krl.collision.bodies import capsules_of, parts_of
 from gcode2krl.collision.gaps import obstacle_gaps, placed
 from gcode2krl.collision.surroundings import pairs_of, surroundings_of
-from gcode2krl.collision.turning import Turning
+from gcode2krl.collision.watch import Turning
 from tests.test_clearance import cell_with
 from tests.test_external_axes import BASE, ON_TABLE, RAIL, TABLE, TABLE_MACHINE, cone
 

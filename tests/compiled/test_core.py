@@ -26,6 +26,8 @@ def native(name):
 
 def test_the_constants_of_the_core_are_those_of_the_python_modules():
     constants = native("constants")
+    if not constants.HEADER.exists():
+        pytest.skip("the core was built elsewhere")
     assert constants.HEADER.read_text(encoding="ascii") == constants.header()
 
 

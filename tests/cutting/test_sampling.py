@@ -8,7 +8,7 @@ import pytest
 
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting import cut
-from gcode2krl.cutting.turns import shaped
+from gcode2krl.cutting.milling import shaped
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import plan_motion
 

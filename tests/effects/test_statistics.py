@@ -6,8 +6,8 @@ import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.effects import Dependence, Effect, Mismatch, Parameter, Role, Where, library
-from gcode2krl.effects.consistency import what_is_wrong
 from gcode2krl.effects.effect import LINKS
+from gcode2krl.effects.registry import what_is_wrong
 from gcode2krl.units import DEG_PER_RAD
 from tests.conftest import ROOT
 

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from gcode2krl import Gcode2KrlError, Issue, predict
-from gcode2krl.exchange import Columns, Findings, unit_of
+from gcode2krl.exchange import ColumnFrame, Findings, unit_of
 from tests.conftest import ROOT
 
 STAGES = ("toolpath", "targets", "motion", "joints", "forces", "deflection")
@@ -105,11 +105,11 @@ def test_arrow_takes_texts_flags_and_empty_tables():
         "n": np.array([1, 2, 3], dtype=np.int32),
         "x_mm": np.array([0.5, np.nan, np.inf]),
     }
-    table = pa.table(Columns(columns))
+    table = pa.table(ColumnFrame(columns))
     assert table["name"].to_pylist() == ["a", "b<", "ü" * 40]
     assert table["flag"].to_pylist() == [True, False, True]
     assert table.schema.field("x_mm").metadata == {b"unit": b"mm"}
-    empty = pa.table(Columns({name: values[:0] for name, values in columns.items()}))
+    empty = pa.table(ColumnFrame({name: values[:0] for name, values in columns.items()}))
     assert empty.num_rows == 0
     assert empty.schema.field("x_mm").metadata == {b"unit": b"mm"}
 
@@ -117,10 +117,10 @@ def test_arrow_takes_texts_flags_and_empty_tables():
 def test_a_stream_outlives_its_table_and_the_interpreter_ends_quietly():
     program = (
         "import gc, pyarrow as pa, numpy as np\n"
-        "from gcode2krl.exchange import Columns\n"
-        "reader = pa.RecordBatchReader.from_stream(Columns({'x_mm': np.arange(5.0)}))\n"
+        "from gcode2krl.exchange import ColumnFrame\n"
+        "reader = pa.RecordBatchReader.from_stream(ColumnFrame({'x_mm': np.arange(5.0)}))\n"
         "gc.collect()\n"
-        "kept = pa.RecordBatchReader.from_stream(Columns({'x_mm': np.arange(5.0)}))\n"
+        "kept = pa.RecordBatchReader.from_stream(ColumnFrame({'x_mm': np.arange(5.0)}))\n"
         "print(reader.read_all()['x_mm'].to_pylist())\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)

@@ -10,7 +10,7 @@ from gcode2krl.cell.sections import Machine
 from gcode2krl.codes import all_codes
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gcode import read_stream
-from gcode2krl.gcode.findings import FINDINGS
+from gcode2krl.gcode.findings import all_findings
 
 _HEAD = "G21 G90 G17 G94 F500 S8000 M3\nG0 X0 Y0 Z0\n"
 _WORDS_BEHIND = re.compile(r" \(|, | in a cell| before | without ")
@@ -36,7 +36,7 @@ def _texts(example: str) -> list[str]:
     return [head + part.replace(" followed by ", "\n") for part in parts for head in ("", _HEAD)]
 
 
-@pytest.mark.parametrize("code", sorted({finding.code for finding in FINDINGS.values()} - _NO_GCODE))
+@pytest.mark.parametrize("code", sorted({finding.code for finding in all_findings().values()} - _NO_GCODE))
 def test_the_example_of_a_code_causes_it(code: str) -> None:
     example = all_codes()[code].example
     example, _, dialect = example.partition(", with --dialect ")

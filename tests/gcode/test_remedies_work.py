@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode.findings import FINDINGS
+from gcode2krl.gcode.findings import all_findings
 from gcode2krl.gcode.read import read_stream
 from tests.cells import over_demonstration
 
@@ -130,4 +130,4 @@ def test_who_follows_the_remedy_of_a_reason_gets_the_program_it_promises(name):
 
 def test_every_finding_of_the_reader_has_its_remedy_carried_out():
     told = REMEDIES["code"].keys() | REMEDIES["elsewhere"].keys()
-    assert {finding.code for finding in FINDINGS.values()} == told
+    assert {finding.code for finding in all_findings().values()} == told

@@ -9,7 +9,7 @@ from gcode2krl import load_cell, read_gcode, set_targets
 from gcode2krl.compiled.chunks import chunk_borders
 from gcode2krl.errors import MOST_PLACES
 from gcode2krl.krl import differences, rules
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import TextLayout, compose
 from gcode2krl.krl.differences import differences_of
 from gcode2krl.krl.read import read_texts
 from gcode2krl.robot import ptp_joints
@@ -20,7 +20,7 @@ def case():
     cell = load_cell()
     targets = set_targets(read_gcode("examples/raster_finish.nc", cell), cell)
     joints = ptp_joints(targets, cell)
-    files = compose(targets, joints, cell, "PART", Layout())
+    files = compose(targets, joints, cell, "PART", TextLayout())
     texts = {name: b"".join(pieces) for name, pieces in files.items()}
     return read_texts(texts, "PART.src"), targets, joints, cell
 

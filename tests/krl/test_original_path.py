@@ -13,7 +13,7 @@ from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, 
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
-from gcode2krl.krl.composition import Layout, compose
+from gcode2krl.krl.composition import TextLayout, compose
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.verify import compare
 from gcode2krl.robot import ptp_joints
@@ -235,7 +235,7 @@ def test_no_simplified_program_is_refused(blocks, simplify_mm):
     toolpath = toolpath_of(f"{head}\nF1200\n{body}\nG0 Z20\nM5\nM30\n")
     targets = set_targets(toolpath, CELL, None, simplify_mm)
     joints = ptp_joints(targets, CELL)
-    files = compose(targets, joints, CELL, "PART", Layout())
+    files = compose(targets, joints, CELL, "PART", TextLayout())
     texts = {name: b"".join(pieces) for name, pieces in files.items()}
     report = compare(read_texts(texts, "PART.src"), targets, joints, CELL, original=toolpath)
     assert not [issue for issue in report.issues if issue.code == "verify-original"]

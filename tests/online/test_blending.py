@@ -3,7 +3,7 @@
 import numpy as np
 
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.online.blending import blend_start, blended
+from gcode2krl.online.compensator import blend_start, blended
 
 SETTINGS = Online()
 

@@ -13,7 +13,7 @@ from gcode2krl.compliance.sensor import Calibration, unloaded
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.compensator import (
     Corrections,
-    Samples,
+    CycleInputs,
     build_compensator,
     joints_at,
     sensor_in_flange,
@@ -60,7 +60,9 @@ def samples(cell, seed=1):
     knot = np.searchsorted(np.array([0.16, 0.46, 1.16, 1.26]), time_s, side="right") - 1.0
     full = np.ones(COUNT)
     told = Announced(knot, 99.0 * full, 100.0 * full, 0.0 * full)
-    return Samples(time_s=time_s, load=load, q_rad=q + 1e-4, q_command_rad=q, position_mm=position, told=told)
+    return CycleInputs(
+        time_s=time_s, load=load, q_rad=q + 1e-4, q_command_rad=q, position_mm=position, told=told
+    )
 
 
 @pytest.mark.parametrize("mode", ["cartesian", "axis"])
@@ -91,7 +93,7 @@ def test_a_steady_force_is_corrected_by_what_the_compliance_says(cell):
     device = build_compensator(cell, Online(), load_frame="base")
     taken = samples(cell)
     load = np.tile([0.0, 300.0, -80.0, 0.0, 0.0, 2000.0], (COUNT, 1))
-    taken = Samples(**{f.name: getattr(taken, f.name) for f in fields(Samples)} | {"load": load})
+    taken = CycleInputs(**{f.name: getattr(taken, f.name) for f in fields(CycleInputs)} | {"load": load})
     _, out = stream(device, start(device), taken)
     _, exact = deflection_of(taken.q_rad, load[:, :3], load[:, 3:], [1.0, 0.0, 0.0], cell, 1)
     np.testing.assert_allclose(out.correction[50:], exact[50:], atol=1e-9)
@@ -126,7 +128,9 @@ def test_a_sensor_with_weight_and_offset_gives_the_load_at_the_tip(cell):
         m = rotation.T @ cell.base_matrix()[:3, :3] @ moment + np.cross(tool[:3, 3], f)
         own = unloaded(fr.quaternion_from_rotation(rotation), CALIBRATION)
         shown.append(np.concatenate([f + own[0][0], m + own[1][0]]))
-    taken = Samples(**{f.name: getattr(taken, f.name) for f in fields(Samples)} | {"load": np.array(shown)})
+    taken = CycleInputs(
+        **{f.name: getattr(taken, f.name) for f in fields(CycleInputs)} | {"load": np.array(shown)}
+    )
     _, out = stream(device, start(device), taken)
     np.testing.assert_allclose(out.measured[0], [*force, *moment], atol=1e-6)
     np.testing.assert_allclose(out.measured[-1], [*force, *moment], atol=1e-6)
@@ -147,8 +151,9 @@ def test_a_joint_limit_ahead_holds_the_correction(cell):
     q = np.array([0.0, -95.0, low + 0.5, 0.0, 65.0, 0.0]) * RAD_PER_DEG
     taken = samples(cell)
     here = np.tile(q, (COUNT, 1))
-    taken = Samples(
-        **{f.name: getattr(taken, f.name) for f in fields(Samples)} | {"q_rad": here, "q_command_rad": here}
+    taken = CycleInputs(
+        **{f.name: getattr(taken, f.name) for f in fields(CycleInputs)}
+        | {"q_rad": here, "q_command_rad": here}
     )
     device = build_compensator(cell, Online(), load_frame="base")
     _, out = stream(device, start(device), taken)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from gcode2krl.cell.sections.online import Online
-from gcode2krl.online.filters import filter_start, filtered
+from gcode2krl.online.compensator import filter_start, filtered
 
 SETTINGS = Online()
 

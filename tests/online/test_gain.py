@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.online.gain import MATTERS_MM, gain_of
+from gcode2krl.online.outcome import MATTERS_MM, gain_of
 
 
 def test_a_case_by_hand():

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from gcode2krl import Gcode2KrlError, predict
-from gcode2krl.prediction.samples import pass_numbers
+from gcode2krl.prediction.bundle import pass_numbers
 from tests.conftest import ROOT
 
 

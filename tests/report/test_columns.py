@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 
 RNG = np.random.default_rng(5)
 
@@ -29,7 +29,7 @@ def uneven():
 
 def test_extremes_are_those_of_the_samples(uneven):
     time_s, values = uneven
-    low, high = Columns.of(time_s, 50).extremes(values)
+    low, high = TimeColumns.of(time_s, 50).extremes(values)
     for column, held in enumerate(by_hand(time_s, values, 50)):
         if len(held):
             assert (low[column], high[column]) == (np.nanmin(held), np.nanmax(held))
@@ -40,7 +40,7 @@ def test_extremes_are_those_of_the_samples(uneven):
 
 def test_quantiles_and_mean_are_those_of_the_samples(uneven):
     time_s, values = uneven
-    columns = Columns.of(time_s, 50)
+    columns = TimeColumns.of(time_s, 50)
     tenth, middle = columns.quantiles(values, (0.1, 0.5))
     mean = columns.mean(values)
     for column, held in enumerate(by_hand(time_s, values, 50)):
@@ -57,13 +57,13 @@ def test_quantiles_and_mean_are_those_of_the_samples(uneven):
 
 def test_highest_rows_are_the_largest_of_each_column(uneven):
     time_s, values = uneven
-    rows = Columns.of(time_s, 50).highest_rows(values)
+    rows = TimeColumns.of(time_s, 50).highest_rows(values)
     assert values[rows].tolist() == [np.nanmax(held) for held in by_hand(time_s, values, 50) if len(held)]
 
 
 @pytest.mark.parametrize("rows", [1, 2])
 def test_one_sample_is_a_column(rows):
-    columns = Columns.of(np.zeros(rows), 10)
+    columns = TimeColumns.of(np.zeros(rows), 10)
     assert columns.extremes(np.arange(rows, dtype=float))[1][0] == rows - 1
     assert columns.highest_rows(np.arange(rows, dtype=float)).tolist() == [rows - 1]
 
@@ -72,7 +72,7 @@ class TestHatch:
     time_s = np.arange(200_000) * 0.012
 
     def hatch(self, values):
-        return Columns.of(self.time_s).is_hatch(values, float(np.nanmax(values)))
+        return TimeColumns.of(self.time_s).is_hatch(values, float(np.nanmax(values)))
 
     def test_what_goes_up_and_down_in_each_column_is(self):
         assert self.hatch(50 + 50 * np.sin(self.time_s * 40))
@@ -91,5 +91,5 @@ class TestHatch:
         assert not self.hatch(100 + 0.5 * np.sin(self.time_s * 40))
 
     def test_few_samples_are_a_line(self):
-        columns = Columns.of(np.arange(900.0))
+        columns = TimeColumns.of(np.arange(900.0))
         assert not columns.is_hatch(np.arange(900) % 2.0, 1.0)

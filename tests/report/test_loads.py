@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.report.coloured_path import coloured_path_figure
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.deflections import deflection_figure, share_figure
 from gcode2krl.report.forces import engaged_share, force_figure
 from tests.report.scenes import (
@@ -69,7 +69,7 @@ def test_engagement_is_the_share_of_samples():
     phi_rad = np.full((1000, 4), np.nan)
     phi_rad[::2, :2] = np.radians([30.0, 90.0])
     phi_rad[500:, 2:] = np.radians([120.0, 180.0])
-    share = engaged_share(Columns.of(time_s, 10), phi_rad)
+    share = engaged_share(TimeColumns.of(time_s, 10), phi_rad)
     assert share.shape == (180, 10)
     assert (share[30:90] == 0.5).all()
     assert (share[:30] == 0.0).all()

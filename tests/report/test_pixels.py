@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.report import pixels
-from gcode2krl.report.pixels import Canvas, thicken, worst_per_pixel
+from gcode2krl.report import maps
+from gcode2krl.report.maps import Canvas, thicken, worst_per_pixel
 
 
 def test_a_later_pass_does_not_hide_a_worse_one():
@@ -19,7 +19,7 @@ def test_the_largest_value_of_each_pixel_by_hand(monkeypatch):
     rng = np.random.default_rng(1)
     points = np.cumsum(rng.normal(scale=0.2, size=(4000, 2)), axis=0)
     values = rng.uniform(size=4000)
-    monkeypatch.setattr(pixels, "_CHUNK", 700)
+    monkeypatch.setattr(maps, "_CHUNK", 700)
     canvas = Canvas.around(points, 40)
     image = worst_per_pixel(canvas, points, values, np.ones(4000, dtype=bool))
     cell = ((points - canvas.low_mm) / canvas.pixel_mm).astype(int)

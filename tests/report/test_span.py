@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from gcode2krl.report.columns import Columns
+from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.span import span_of
 
 TIME_S = np.arange(140_000) * 0.012
-COLUMNS = Columns.of(TIME_S)
+COLUMNS = TimeColumns.of(TIME_S)
 
 
 def test_one_spike_is_beyond_the_axis():
@@ -62,5 +62,5 @@ def test_both_sides_of_a_signed_quantity():
 
 @pytest.mark.parametrize("values", [np.zeros(3), np.full(3, np.nan)])
 def test_nothing_to_show(values):
-    span = span_of(Columns.of(np.arange(3.0)), values)
+    span = span_of(TimeColumns.of(np.arange(3.0)), values)
     assert span.height > 0.0

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from gcode2krl.batch import VERDICTS
-from gcode2krl.batch.written.part import Part, Record, name_of, parts_of
+from gcode2krl.batch.written.part import PartResult, Record, name_of, parts_of
 
 SAME = 1e-4
 """Figures are the same if they differ by less than this share: nobody acts on a hundredth of a percent."""
@@ -14,8 +14,8 @@ SAME = 1e-4
 class Change:
     """A part of both runs."""
 
-    before: Part
-    after: Part
+    before: PartResult
+    after: PartResult
 
     @property
     def name(self) -> str:
@@ -52,8 +52,8 @@ class Change:
 class Difference:
     """Two runs beside each other; each list by name, ``changed`` with the largest change of time first."""
 
-    new: tuple[Part, ...]
-    gone: tuple[Part, ...]
+    new: tuple[PartResult, ...]
+    gone: tuple[PartResult, ...]
     refused: tuple[Change, ...]
     """Written before and not any more."""
     mended: tuple[Change, ...]
@@ -99,7 +99,7 @@ def with_against(records: Iterable[Record], before: Iterable[Record] | None) -> 
     return [{**record, "against": _against(then.get(name_of(record)))} for record in records]
 
 
-def _against(part: Part | None) -> dict[str, object] | None:
+def _against(part: PartResult | None) -> dict[str, object] | None:
     if part is None:
         return None
     return {

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference, difference
-from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
+from gcode2krl.batch.written.part import PartResult, Record, parts_of, told_of
 from gcode2krl.batch.written.sarif import quoted
 from gcode2krl.batch.written.words import (
     deflection,
@@ -124,7 +124,7 @@ _COLUMNS = (
 )
 
 
-def _keys(parts: Sequence[Part], changes: dict[str, "_Changed"]) -> dict[str, list[float | int | None]]:
+def _keys(parts: Sequence[PartResult], changes: dict[str, "_Changed"]) -> dict[str, list[float | int | None]]:
     """Return what each column is sorted by, a number a row; None is not known."""
     names = sorted((part.name for part in parts), key=_natural)
     place = {name: number for number, name in enumerate(names)}
@@ -139,10 +139,10 @@ def _keys(parts: Sequence[Part], changes: dict[str, "_Changed"]) -> dict[str, li
     }
 
 
-def _row(part: Part, change: "_Changed | None") -> Row:
+def _row(part: PartResult, change: "_Changed | None") -> Row:
     shown = part.reasons() or part.of_severity("warning")
     told = [(file, finding) for file, one in told_of(shown) for finding in one.findings][:_MOST_FINDINGS]
-    rest = len(part.of_severity("error", "warning")) - sum(len(finding.issues) for _, finding in told)
+    hidden = len(part.of_severity("error", "warning")) - sum(len(finding.issues) for _, finding in told)
     return Row(
         name=printable(part.name),
         verdict=part.verdict,
@@ -161,11 +161,11 @@ def _row(part: Part, change: "_Changed | None") -> Row:
             )
             for file, finding in told
         ),
-        others=f"and {rest:,} more" if rest > 0 else "",
+        others=f"and {hidden:,} more" if hidden > 0 else "",
     )
 
 
-def _changes(found: Difference, parts: Iterable[Part]) -> dict[str, _Changed]:
+def _changes(found: Difference, parts: Iterable[PartResult]) -> dict[str, _Changed]:
     """Return part → what changed; what is not written any more is the largest change."""
     changes = {part.name: _Changed("the same", 0.0) for part in parts}
     changes |= {part.name: _Changed("new", None) for part in found.new}

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gcode2krl.batch import VERDICTS
-from gcode2krl.batch.written.part import Finding, Part, Record, lines_of, parts_of
+from gcode2krl.batch.written.part import FileIssue, PartResult, Record, lines_of, parts_of
 from gcode2krl.batch.written.words import demonstration, one_line, printable
 
 _MOST_MESSAGE = 500
@@ -21,18 +21,18 @@ def junit_xml(records: Iterable[Record]) -> bytes:
     root = ElementTree.Element("testsuites", {"name": "gcode2krl", **_totals(parts)})
     folders = sorted({part.folder for part in parts})
     for folder in folders:
-        own = [part for part in parts if part.folder == folder]
-        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(folder), **_totals(own)})
-        if warning := demonstration(own):
+        in_folder = [part for part in parts if part.folder == folder]
+        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(folder), **_totals(in_folder)})
+        if warning := demonstration(in_folder):
             properties = ElementTree.SubElement(suite, "properties")
             ElementTree.SubElement(properties, "property", name="cell", value=warning)
-        suite.extend(_case(part) for part in own)
+        suite.extend(_case(part) for part in in_folder)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _totals(parts: list[Part]) -> dict[str, str]:
+def _totals(parts: list[PartResult]) -> dict[str, str]:
     verdicts = [part.verdict for part in parts]
     return {
         "tests": str(len(parts)),
@@ -43,7 +43,7 @@ def _totals(parts: list[Part]) -> dict[str, str]:
     }
 
 
-def _case(part: Part) -> ElementTree.Element:
+def _case(part: PartResult) -> ElementTree.Element:
     case = ElementTree.Element(
         "testcase",
         classname=printable(part.folder),
@@ -59,12 +59,12 @@ def _case(part: Part) -> ElementTree.Element:
     return case
 
 
-def _beside_errors(part: Part) -> tuple[Finding, ...]:
+def _beside_errors(part: PartResult) -> tuple[FileIssue, ...]:
     """Return the warnings of a part that was not written, unless they are the reason."""
     return part.of_severity("warning") if part.count("error") else ()
 
 
-def _refusal(part: Part) -> ElementTree.Element:
+def _refusal(part: PartResult) -> ElementTree.Element:
     """Return the failure or the error, with all that kept the part from being written."""
     reasons = part.reasons()
     first = reasons[0].issue if reasons else None

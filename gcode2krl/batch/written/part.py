@@ -22,7 +22,7 @@ _PAGE = ".html"
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class FileIssue:
     """A finding, and the file that it is about where that is not the program: the cell's."""
 
     issue: Issue
@@ -30,7 +30,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PartResult:
     """What became of one part; a figure that is not known is None."""
 
     name: str
@@ -45,7 +45,7 @@ class Part:
     time_s: float | None = None
     force_N: float | None = None
     deflection_mm: float | None = None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[FileIssue, ...] = ()
     thumbnail: tuple[tuple[float, float], ...] = ()
     """Feed moves seen from above (mm)."""
     is_demonstration: bool = False
@@ -68,7 +68,7 @@ class Part:
         """Its name without folder."""
         return self.name.rpartition("/")[2]
 
-    def of_severity(self, *severities: str) -> tuple[Finding, ...]:
+    def of_severity(self, *severities: str) -> tuple[FileIssue, ...]:
         """Return the findings of these severities."""
         return tuple(finding for finding in self.findings if finding.issue.severity in severities)
 
@@ -76,22 +76,22 @@ class Part:
         """Return how many findings have this severity."""
         return len(self.of_severity(severity))
 
-    def reasons(self) -> tuple[Finding, ...]:
+    def reasons(self) -> tuple[FileIssue, ...]:
         """Return what kept a part from being written: its errors, or else its warnings (``--strict``)."""
         if self.is_written:
             return ()
         return self.of_severity("error") or self.of_severity("warning")
 
 
-def parts_of(records: Iterable[Record]) -> list[Part]:
+def parts_of(records: Iterable[Record]) -> list[PartResult]:
     """Return the parts of records, by name; of several records of one part the last counts."""
     last = {part.name: part for part in map(part_of, records)}
     return [last[name] for name in sorted(last)]
 
 
-def part_of(record: Record) -> Part:
+def part_of(record: Record) -> PartResult:
     """Return the part of a record."""
-    return Part(
+    return PartResult(
         name=name_of(record),
         verdict=_verdict(record.get("exit_code")),
         source=_source(record),
@@ -122,7 +122,7 @@ def _is_demonstration(cell: Any) -> bool:
     return isinstance(cell, Mapping) and cell.get("file") is None
 
 
-def told_of(findings: Iterable[Finding]) -> list[tuple[str, Told]]:
+def told_of(findings: Iterable[FileIssue]) -> list[tuple[str, Told]]:
     """Return what to print of findings, as the command line does: (file, findings), "" for the program."""
     by_file: dict[str, list[Issue]] = {}
     for finding in findings:
@@ -130,7 +130,7 @@ def told_of(findings: Iterable[Finding]) -> list[tuple[str, Told]]:
     return [(file, told(issues)) for file, issues in by_file.items()]
 
 
-def lines_of(findings: Iterable[Finding], source: str) -> list[str]:
+def lines_of(findings: Iterable[FileIssue], source: str) -> list[str]:
     """Return the lines that the command line prints of findings on a file."""
     return [line for file, one in told_of(findings) for line in one.lines(file or source)]
 
@@ -150,7 +150,7 @@ def _list(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
-def _finding(stated: Mapping[str, Any]) -> Finding:
+def _finding(stated: Mapping[str, Any]) -> FileIssue:
     severity = stated.get("severity")
     line = _number(stated.get("line")) or 0.0
     issue = Issue(
@@ -161,7 +161,7 @@ def _finding(stated: Mapping[str, Any]) -> Finding:
         remedy=str(stated.get("remedy") or ""),
         column=max(int(_number(stated.get("column")) or 0), 0),
     )
-    return Finding(issue, str(stated.get("file") or "").replace("\\", "/"))
+    return FileIssue(issue, str(stated.get("file") or "").replace("\\", "/"))
 
 
 def _points(stated: Any) -> tuple[tuple[float, float], ...]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 from urllib.parse import quote
 
-from gcode2krl.batch.written.part import Part, Record, parts_of
+from gcode2krl.batch.written.part import PartResult, Record, parts_of
 from gcode2krl.batch.written.words import demonstration, printable
 from gcode2krl.codes import Code, all_codes
 from gcode2krl.errors import Issue
@@ -29,13 +29,13 @@ same as another."""
 def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     """Return the file; ``root`` is the absolute folder in which the run began."""
     parts = parts_of(records)
-    found = sorted(set(_results(parts, root)))
-    kept = found[:MOST_RESULTS]
+    results = sorted(set(_results(parts, root)))
+    kept = results[:MOST_RESULTS]
     codes = sorted({code for *_, code, _ in kept})
     run = {
         "tool": {"driver": _driver(codes)},
         "invocations": [
-            {"executionSuccessful": True} | _notified(demonstration(parts), len(found) - len(kept))
+            {"executionSuccessful": True} | _notified(demonstration(parts), len(results) - len(kept))
         ],
         "originalUriBaseIds": {_BASE: {"description": {"text": "The folder in which gcode2krl was run."}}},
         "columnKind": "unicodeCodePoints",
@@ -45,7 +45,7 @@ def findings_sarif(records: Iterable[Record], root: str = "") -> bytes:
     return (json.dumps(log, indent=1) + "\n").encode("ascii")
 
 
-def _results(parts: Iterable[Part], root: str) -> Iterator[_Result]:
+def _results(parts: Iterable[PartResult], root: str) -> Iterator[_Result]:
     """Yield all findings; one on a cell comes once, whatever number of parts has it."""
     for part in parts:
         path = below_root(part.source, root)

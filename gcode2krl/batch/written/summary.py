@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import difference
-from gcode2krl.batch.written.part import Part, Record, parts_of, told_of
+from gcode2krl.batch.written.part import PartResult, Record, parts_of, told_of
 from gcode2krl.batch.written.words import (
     deflection,
     demonstration,
@@ -37,8 +37,8 @@ def summary_md(records: Iterable[Record], before: Iterable[Record] | None = None
     lines = [f"# {headline(parts)}", ""]
     if warning := demonstration(parts):
         lines += [f"> **{markdown(warning)}**", ""]
-    told = [(fact, f" ({_name(fact.part)})" if fact.part else "") for fact in facts(parts)]
-    lines += [f"- {fact.name}: {fact.value}{where}" for fact, where in told]
+    notes = [(fact, f" ({_name(fact.part)})" if fact.part else "") for fact in facts(parts)]
+    lines += [f"- {fact.name}: {fact.value}{where}" for fact, where in notes]
     lines += _refused([part for part in parts if not part.is_written])
     if before is not None:
         lines += _changes(records, before)
@@ -46,7 +46,7 @@ def summary_md(records: Iterable[Record], before: Iterable[Record] | None = None
     return "\n".join(lines) + "\n"
 
 
-def _refused(parts: Sequence[Part]) -> Iterator[str]:
+def _refused(parts: Sequence[PartResult]) -> Iterator[str]:
     if not parts:
         return
     yield from ("", "## Not written", "")
@@ -56,7 +56,7 @@ def _refused(parts: Sequence[Part]) -> Iterator[str]:
     yield from _more(len(parts) - _MOST_REFUSED)
 
 
-def _first_finding(part: Part) -> tuple[str, str, str]:
+def _first_finding(part: PartResult) -> tuple[str, str, str]:
     """Return line, sentence and remedy of what kept a part from being written."""
     findings = [(file, finding) for file, told in told_of(part.reasons()) for finding in told.findings]
     if not findings:
@@ -70,9 +70,9 @@ def _first_finding(part: Part) -> tuple[str, str, str]:
 
 
 def _changes(records: Iterable[Record], before: Iterable[Record]) -> Iterator[str]:
-    found = difference(records, before)
-    yield from ("", "## Against the last run", "", difference_sentence(found))
-    rows = list(difference_rows(found))
+    changes = difference(records, before)
+    yield from ("", "## Against the last run", "", difference_sentence(changes))
+    rows = list(difference_rows(changes))
     if rows:
         yield ""
         yield from _head("part", "", "time", "largest force", "largest deflection")
@@ -81,7 +81,7 @@ def _changes(records: Iterable[Record], before: Iterable[Record]) -> Iterator[st
     yield from _more(len(rows) - _MOST_CHANGED)
 
 
-def _longest(parts: Sequence[Part]) -> Iterator[str]:
+def _longest(parts: Sequence[PartResult]) -> Iterator[str]:
     if not parts:
         return
     yield from ("", "## Longest", "")

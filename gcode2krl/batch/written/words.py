@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gcode2krl.batch import VERDICTS
 from gcode2krl.batch.written.changes import Change, Difference
-from gcode2krl.batch.written.part import Part
+from gcode2krl.batch.written.part import PartResult
 from gcode2krl.report.page.content import duration
 
 UNKNOWN = "–"
@@ -49,7 +49,7 @@ def deflection(value_mm: float | None) -> str:
     return UNKNOWN if value_mm is None else f"{value_mm:.3f} mm"
 
 
-def headline(parts: Sequence[Part]) -> str:
+def headline(parts: Sequence[PartResult]) -> str:
     """Return how many parts were written, refused and not understood."""
     verdicts = [part.verdict for part in parts]
     written, *others = [(verdicts.count(verdict), verdict) for verdict in VERDICTS]
@@ -61,7 +61,7 @@ def headline(parts: Sequence[Part]) -> str:
     return f"{written[0]:,} of {_counted(len(parts), 'part')} written, {named}"
 
 
-def demonstration(parts: Sequence[Part]) -> str:
+def demonstration(parts: Sequence[PartResult]) -> str:
     """Return the warning that parts were translated for the demonstration cell, empty where none was."""
     count = sum(part.is_demonstration for part in parts)
     if not count:
@@ -73,24 +73,24 @@ def demonstration(parts: Sequence[Part]) -> str:
     )
 
 
-def facts(parts: Sequence[Part]) -> list[Fact]:
+def facts(parts: Sequence[PartResult]) -> list[Fact]:
     """Return the figures of a whole run."""
     written = [part for part in parts if part.is_written]
     cached = sum(part.cached for part in parts)
     warnings = sum(part.count("warning") for part in parts)
-    found = [Fact("machining time", duration(sum(part.time_s or 0.0 for part in written)))] if written else []
-    found += _largest("largest force", written, lambda part: part.force_N, force)
-    found += _largest("largest deflection", written, lambda part: part.deflection_mm, deflection)
-    found.append(Fact("computed in", duration(sum(part.seconds or 0.0 for part in parts))))
-    found += [Fact("from the cache", _counted(cached, "part"))] if cached else []
-    found += [Fact("warnings", f"{warnings:,}")] if warnings else []
-    return found
+    facts = [Fact("machining time", duration(sum(part.time_s or 0.0 for part in written)))] if written else []
+    facts += _largest("largest force", written, lambda part: part.force_N, force)
+    facts += _largest("largest deflection", written, lambda part: part.deflection_mm, deflection)
+    facts.append(Fact("computed in", duration(sum(part.seconds or 0.0 for part in parts))))
+    facts += [Fact("from the cache", _counted(cached, "part"))] if cached else []
+    facts += [Fact("warnings", f"{warnings:,}")] if warnings else []
+    return facts
 
 
 def _largest(
     name: str,
-    parts: Iterable[Part],
-    figure: Callable[[Part], float | None],
+    parts: Iterable[PartResult],
+    figure: Callable[[PartResult], float | None],
     words: Callable[[float | None], str],
 ) -> list[Fact]:
     known = [(value, part.name) for part in parts if (value := figure(part)) is not None]
@@ -148,8 +148,8 @@ def share(before: float | None, after: float | None) -> str:
 def _from_to(before: float | None, after: float | None, words: Callable[[float | None], str]) -> str:
     """Return two figures and the change in percent, one figure where they read the same."""
     percent = share(before, after)
-    told = words(after) if words(before) == words(after) else f"{words(before)} → {words(after)}"
-    return f"{told} ({percent})" if percent else told
+    shown = words(after) if words(before) == words(after) else f"{words(before)} → {words(after)}"
+    return f"{shown} ({percent})" if percent else shown
 
 
 def _counted(count: int, noun: str) -> str:

@@ -75,8 +75,8 @@ class Obstacle(Section):
     def _one_shape(self) -> Self:
         given = [name for name in ("box_mm", "mesh", "plane") if getattr(self, name) is not None]
         if len(given) != 1:
-            found = " and ".join(given) if given else "none"
-            raise ValueError(f"give one of box_mm, mesh and plane, found {found}")
+            stated = " and ".join(given) if given else "none"
+            raise ValueError(f"give one of box_mm, mesh and plane, found {stated}")
         if self.box_mm is not None:
             for axis, low, high in zip("xyz", *self.box_mm, strict=True):
                 if low >= high:

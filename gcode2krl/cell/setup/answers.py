@@ -9,13 +9,13 @@ from gcode2krl.cell import library
 from gcode2krl.cell.key_lines import with_lines
 from gcode2krl.cell.ranges import all_ranges
 from gcode2krl.cell.ranges import general as general_key
-from gcode2krl.cell.setup.controller import FRAME_KEYS, Controller
+from gcode2krl.cell.setup.controller import FRAME_KEYS, ArchivedController
 from gcode2krl.cell.setup.questions import (
     GENERAL_QUESTIONS,
     MACHINE_QUESTIONS,
     TOOL_QUESTIONS,
     Answers,
-    Question,
+    CellQuestion,
 )
 from gcode2krl.codes import closest
 from gcode2krl.errors import Issue, NotUnderstoodError
@@ -27,7 +27,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _KRL_MEMBER = re.compile(r"(?:\b[A-Z]\d?|\b[A-Z]{2})\s+(?=[-+.\d])", re.I)
 
 
-def answer_of_words(question: Question, words: str, controller: Controller) -> Any:
+def answer_of_words(question: CellQuestion, words: str, controller: ArchivedController) -> Any:
     """Return the answer that a person typed, None if nothing; raises `ValueError` with what is allowed.
 
     Several numbers may be a KRL frame or axis target as the controller writes it.
@@ -49,7 +49,7 @@ def answer_of_words(question: Question, words: str, controller: Controller) -> A
     return checked(question, int(numbers[0]) if whole else numbers[0], controller)
 
 
-def checked(question: Question, value: Any, controller: Controller) -> Any:
+def checked(question: CellQuestion, value: Any, controller: ArchivedController) -> Any:
     """Return an answer in its type, None if it is empty; raises `ValueError` with what is allowed."""
     if value is None or value == "":
         if question.needed:
@@ -76,7 +76,7 @@ def checked(question: Question, value: Any, controller: Controller) -> Any:
     return [float(one) for one in numbers] if question.kind == "numbers" else float(numbers[0])
 
 
-def _choice(question: Question, value: Any, controller: Controller) -> str:
+def _choice(question: CellQuestion, value: Any, controller: ArchivedController) -> str:
     known = [name for name, _ in question.choices(controller)] if question.choices else []
     folded = {_fold(name): name for name in known}
     if not isinstance(value, str) or _fold(value) not in folded:
@@ -86,7 +86,7 @@ def _choice(question: Question, value: Any, controller: Controller) -> str:
     return folded[_fold(value)]
 
 
-def _refuse_impossible(question: Question, number: float) -> None:
+def _refuse_impossible(question: CellQuestion, number: float) -> None:
     """Raise `ValueError` where a number is beyond the possible range of its key in the cell."""
     key = general_key(question.cell_key)
     if question.kind == "whole":
@@ -103,14 +103,14 @@ def _refuse_impossible(question: Question, number: float) -> None:
         raise ValueError(f"found {number:g}, allowed: {low:g} to {high:g}")
 
 
-def _allowed(question: Question) -> str:
+def _allowed(question: CellQuestion) -> str:
     if question.kind == "numbers":
         return f"{question.count} numbers, such as {' '.join(f'{one:g}' for one in question.example)}"
     kind = {"number": "a number", "whole": "a whole number"}.get(question.kind, "a name")
     return f"{kind}, such as {question.example}"
 
 
-def completed(given: Answers, controller: Controller) -> dict[str, Any]:
+def completed(given: Answers, controller: ArchivedController) -> dict[str, Any]:
     """Return answers with what the archive states where they say nothing, of all questions that apply."""
     answers: dict[str, Any] = {"tools": []}
     for question in GENERAL_QUESTIONS:
@@ -120,14 +120,16 @@ def completed(given: Answers, controller: Controller) -> dict[str, Any]:
     return answers
 
 
-def _completed_tool(given: Answers, general: Answers, controller: Controller) -> dict[str, Any]:
+def _completed_tool(given: Answers, general: Answers, controller: ArchivedController) -> dict[str, Any]:
     tool: dict[str, Any] = {"tools_by": general.get("tools_by")}
     for question in TOOL_QUESTIONS:
         _take(question, given, tool, controller)
     return tool
 
 
-def _take(question: Question, given: Answers, answers: dict[str, Any], controller: Controller) -> None:
+def _take(
+    question: CellQuestion, given: Answers, answers: dict[str, Any], controller: ArchivedController
+) -> None:
     if not question.when(answers):
         return
     is_answered = question.key in given  # with None by who left it out at the terminal
@@ -136,7 +138,7 @@ def _take(question: Question, given: Answers, answers: dict[str, Any], controlle
         answers[question.key] = value
 
 
-def read_answers(path: Path, controller: Controller) -> dict[str, Any]:
+def read_answers(path: Path, controller: ArchivedController) -> dict[str, Any]:
     """Read answers from a TOML file; raises `NotUnderstoodError` with the line of each that is wrong."""
     text = library.read_text(path)
     data = library.parse_toml(text, str(path))
@@ -158,10 +160,10 @@ def read_answers(path: Path, controller: Controller) -> dict[str, Any]:
 
 
 def _checked_table(
-    questions: Sequence[Question],
+    questions: Sequence[CellQuestion],
     data: Mapping[str, Any],
     place: str,
-    controller: Controller,
+    controller: ArchivedController,
     issues: list[Issue],
 ) -> dict[str, Any]:
     known = {question.key: question for question in questions}
@@ -194,12 +196,12 @@ def unanswered(answers: Answers) -> Iterator[Issue]:
         yield _issue("mounted_tool", f"found {answers['mounted_tool']}, which is none of the tools")
 
 
-def left_out(answers: Answers) -> list[Question]:
+def left_out(answers: Answers) -> list[CellQuestion]:
     """Return the questions that apply and have no answer, without those of single tools."""
     return [one for one in GENERAL_QUESTIONS if one.when(answers) and answers.get(one.key) is None]
 
 
-def _tables(answers: Answers) -> Iterator[tuple[str, Sequence[Question], Answers]]:
+def _tables(answers: Answers) -> Iterator[tuple[str, Sequence[CellQuestion], Answers]]:
     yield "", GENERAL_QUESTIONS, answers
     for count, tool in enumerate(answers.get("tools", ())):
         yield f"tools.{count}.", TOOL_QUESTIONS, tool

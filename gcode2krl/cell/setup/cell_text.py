@@ -19,7 +19,7 @@ from gcode2krl.cell.descriptions import Description, descriptions_of
 from gcode2krl.cell.sections import Clearance, Frame, Frames, Home, Load, Robot, Spindle
 from gcode2krl.cell.sections import Controller as ControllerSection
 from gcode2krl.cell.setup.answers import frame_table
-from gcode2krl.cell.setup.controller import Controller, ExternalData
+from gcode2krl.cell.setup.controller import ArchivedController, ExternalData
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, UNKNOWN, Answers
 from gcode2krl.units import DEG_PER_RAD
 
@@ -45,7 +45,7 @@ class _Writer:
     """Answers, and what the controller's archive states."""
 
     answers: Answers
-    controller: Controller
+    controller: ArchivedController
     is_of_archive: Mapping[str, bool]
     """Question → whether its answer is what the archive states."""
 
@@ -282,7 +282,7 @@ _NEEDED_BY_PROGRAMS = (
 """Questions whose key stands in a comment where nobody answered."""
 
 
-def text_of_cell(answers: Answers, controller: Controller, schema: str) -> str:
+def text_of_cell(answers: Answers, controller: ArchivedController, schema: str) -> str:
     """Return the text of the cell file; ``schema`` is the path of its JSON schema, for editors."""
     proposed = {one.key: one.proposal(controller, answers) for one in GENERAL_QUESTIONS}
     equal = {key: value is not None and answers.get(key) == value for key, value in proposed.items()}
@@ -326,9 +326,9 @@ def _line(section: Any, name: str, value: Any) -> Iterator[str]:
 
 def _commented(stated: str, comment: str) -> Iterator[str]:
     """Yield a line with its comment behind it, or above it where that would be too long."""
-    beside = f"{stated:<{_COMMENT_COLUMN}}# {comment}"
-    if len(beside) <= _LONGEST_LINE and len(stated) < _COMMENT_COLUMN:
-        yield beside
+    line = f"{stated:<{_COMMENT_COLUMN}}# {comment}"
+    if len(line) <= _LONGEST_LINE and len(stated) < _COMMENT_COLUMN:
+        yield line
     else:
         yield from textwrap.wrap(comment, _LONGEST_LINE, initial_indent="# ", subsequent_indent="# ")
         yield stated

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gcode2krl.cell import library
-from gcode2krl.cell.setup.controller import Controller, NamedFrame, Payload, robots_of_lengths
+from gcode2krl.cell.setup.controller import ArchivedController, NamedFrame, Payload, robots_of_lengths
 
 Answers = Mapping[str, Any]
 """Key of a question → its answer; ``tools`` is a list of such tables."""
@@ -29,12 +29,12 @@ def _always(answers: Answers) -> bool:
     return True
 
 
-def _nothing(controller: Controller, answers: Answers) -> Any:
+def _nothing(controller: ArchivedController, answers: Answers) -> Any:
     return None
 
 
 @dataclass(frozen=True)
-class Question:
+class CellQuestion:
     """A question, asked if ``when`` holds; an empty answer leaves the key out unless it is ``needed``."""
 
     key: str
@@ -49,8 +49,8 @@ class Question:
     of_archive: bool = False
     """Asked at a terminal only where the archive has something to choose from."""
     when: Callable[[Answers], bool] = _always
-    choices: Callable[[Controller], list[Choice]] | None = None
-    proposal: Callable[[Controller, Answers], Any] = _nothing
+    choices: Callable[[ArchivedController], list[Choice]] | None = None
+    proposal: Callable[[ArchivedController, Answers], Any] = _nothing
     """What the controller's archive states."""
 
 
@@ -62,7 +62,7 @@ def _states(key: str) -> Callable[[Answers], bool]:
     return lambda answers: bool(answers.get(key))
 
 
-def _choices(*pairs: Choice) -> Callable[[Controller], list[Choice]]:
+def _choices(*pairs: Choice) -> Callable[[ArchivedController], list[Choice]]:
     return lambda controller: list(pairs)
 
 
@@ -77,7 +77,7 @@ def _only(frames: tuple[NamedFrame, ...]) -> int | None:
     return frames[0].number if len(frames) == 1 else None
 
 
-def _robots(controller: Controller) -> list[Choice]:
+def _robots(controller: ArchivedController) -> list[Choice]:
     """Return the robots that can be it: an archive of another arm is no archive of this robot."""
     listed = [(name, "") for name in robots_of_lengths(controller.lengths_mm)]
     where = "the file" if controller.is_description else "the archive"
@@ -85,7 +85,7 @@ def _robots(controller: Controller) -> list[Choice]:
     return [*listed, *own]
 
 
-def _robot(controller: Controller, answers: Answers) -> str | None:
+def _robot(controller: ArchivedController, answers: Answers) -> str | None:
     return controller.model or (OTHER if controller.lengths_mm else None)
 
 
@@ -97,21 +97,21 @@ def _lacks_limits(answers: Answers) -> bool:
     )
 
 
-def _limits(controller: Controller, answers: Answers) -> list[float] | None:
+def _limits(controller: ArchivedController, answers: Answers) -> list[float] | None:
     return [limit for pair in controller.limits_deg for limit in pair] if controller.limits_deg else None
 
 
-def _mounting(controller: Controller, answers: Answers) -> str | None:
+def _mounting(controller: ArchivedController, answers: Answers) -> str | None:
     if controller.robroot is None:
         return None
     return OTHER if any(controller.robroot) else "floor"
 
 
-def _home(controller: Controller, answers: Answers) -> list[float] | None:
+def _home(controller: ArchivedController, answers: Answers) -> list[float] | None:
     return list(controller.home_deg) if controller.home_deg else None
 
 
-def _payload(controller: Controller, answers: Answers) -> Payload | None:
+def _payload(controller: ArchivedController, answers: Answers) -> Payload | None:
     """Return the load of the tool that the answers name, or the only load."""
     loads = controller.loads or {}
     numbers = [answers.get("reference_number"), *(tool.get("data") for tool in answers.get("tools", ()))]
@@ -119,17 +119,17 @@ def _payload(controller: Controller, answers: Answers) -> Payload | None:
     return named[0] if named else (next(iter(loads.values())) if len(loads) == 1 else None)
 
 
-def _mass(controller: Controller, answers: Answers) -> float | None:
+def _mass(controller: ArchivedController, answers: Answers) -> float | None:
     load = _payload(controller, answers)
     return load.mass_kg if load else None
 
 
-def _centre(controller: Controller, answers: Answers) -> list[float] | None:
+def _centre(controller: ArchivedController, answers: Answers) -> list[float] | None:
     load = _payload(controller, answers)
     return list(load.centre_mm) if load else None
 
 
-def _inertia(controller: Controller, answers: Answers) -> list[float] | None:
+def _inertia(controller: ArchivedController, answers: Answers) -> list[float] | None:
     load = _payload(controller, answers)
     return list(load.inertia_kgm2) if load and load.inertia_kgm2 else None
 
@@ -147,8 +147,8 @@ _AXIS_PLACE = "jog with TOOL as the coordinate system: which direction pulls the
 # --- the questions ----------------------------------------------------------------------------------------
 
 PLACE_QUESTIONS = (
-    Question("name", "What is the cell called?", "yours to choose", "name", "Milling cell 2"),
-    Question(
+    CellQuestion("name", "What is the cell called?", "yours to choose", "name", "Milling cell 2"),
+    CellQuestion(
         "robot",
         "Which robot is it?",
         "Help > Info > Robot, and the plate on the arm",
@@ -158,7 +158,7 @@ PLACE_QUESTIONS = (
         choices=_robots,
         proposal=_robot,
     ),
-    Question(
+    CellQuestion(
         "limits_deg",
         "Joint limits in degrees: low and high of A1, then of A2 to A6",
         "Start-up > Service > Software limit switch",
@@ -169,7 +169,7 @@ PLACE_QUESTIONS = (
         when=_lacks_limits,
         proposal=_limits,
     ),
-    Question(
+    CellQuestion(
         "kss",
         "Which KUKA System Software does the controller run?",
         "Help > Info",
@@ -182,7 +182,7 @@ PLACE_QUESTIONS = (
         ),
         proposal=lambda controller, _: controller.kss or UNKNOWN,
     ),
-    Question(
+    CellQuestion(
         "mounting",
         "How is it mounted?",
         "Display > Variable > Single, $ROBROOT: all zero is floor",
@@ -195,7 +195,7 @@ PLACE_QUESTIONS = (
         ),
         proposal=_mounting,
     ),
-    Question(
+    CellQuestion(
         "robroot",
         f"$ROBROOT: {_FRAME}",
         "Display > Variable > Single, $ROBROOT",
@@ -206,7 +206,7 @@ PLACE_QUESTIONS = (
         when=_is("mounting", OTHER),
         proposal=lambda controller, _: list(controller.robroot) if controller.robroot else None,
     ),
-    Question(
+    CellQuestion(
         "home",
         "HOME: A1 to A6 in degrees",
         "Display > Actual position > Axis-specific, with the robot at HOME",
@@ -216,7 +216,7 @@ PLACE_QUESTIONS = (
         6,
         proposal=_home,
     ),
-    Question(
+    CellQuestion(
         "base_number",
         "Number of the base in which the work lies; 0: the program writes $BASE itself",
         "Start-up > Calibrate > Base, or Display > Actual position",
@@ -226,7 +226,7 @@ PLACE_QUESTIONS = (
         choices=lambda controller: [(str(one.number), one.text()) for one in controller.bases],
         proposal=lambda controller, _: _only(controller.bases),
     ),
-    Question(
+    CellQuestion(
         "base",
         f"That base: {_FRAME}",
         "Start-up > Calibrate > Base > Numeric input",
@@ -236,7 +236,7 @@ PLACE_QUESTIONS = (
         6,
         proposal=lambda controller, answers: _entry(controller.bases, answers.get("base_number")),
     ),
-    Question(
+    CellQuestion(
         "clearance_mm",
         "Height in that base above which the robot can go anywhere over the work, in mm",
         "jog the tip above clamps and probes, then Display > Actual position > Cartesian, with this base",
@@ -244,7 +244,7 @@ PLACE_QUESTIONS = (
         150.0,
         "clearance.z_mm",
     ),
-    Question(
+    CellQuestion(
         "table_mm",
         "Height of the table in that base, in mm; empty: not checked",
         "touch the table with the tip, then Display > Actual position > Cartesian, with this base",
@@ -256,7 +256,7 @@ PLACE_QUESTIONS = (
 """Robot, HOME, base and planes."""
 
 REFERENCE_QUESTIONS = (
-    Question(
+    CellQuestion(
         "tools_by",
         "How are the tools measured?",
         "Start-up > Calibrate > Tool: one entry, or one for each cutter",
@@ -268,7 +268,7 @@ REFERENCE_QUESTIONS = (
             ("length", "one tool was measured; the others differ from it by their length"),
         ),
     ),
-    Question(
+    CellQuestion(
         "reference_number",
         "TOOL_DATA number of the tool that was measured",
         _TOOL_MENU,
@@ -280,7 +280,7 @@ REFERENCE_QUESTIONS = (
         choices=lambda controller: [(str(one.number), one.text()) for one in controller.tools],
         proposal=lambda controller, _: _only(controller.tools),
     ),
-    Question(
+    CellQuestion(
         "reference_frame",
         f"Its frame: {_FRAME}",
         _TOOL_MENU,
@@ -291,7 +291,7 @@ REFERENCE_QUESTIONS = (
         when=_is("tools_by", "length"),
         proposal=lambda controller, answers: _entry(controller.tools, answers.get("reference_number")),
     ),
-    Question(
+    CellQuestion(
         "reference_axis",
         "Which axis of that frame points from the tip to the holder?",
         _AXIS_PLACE,
@@ -301,7 +301,7 @@ REFERENCE_QUESTIONS = (
         when=_is("tools_by", "length"),
         choices=_AXES,
     ),
-    Question(
+    CellQuestion(
         "reference_length_mm",
         "Length of the tool that was measured, from the spindle's gauge line to the tip, in mm",
         "tool presetter, or a height gauge",
@@ -314,10 +314,10 @@ REFERENCE_QUESTIONS = (
 """How the tools are measured."""
 
 TOOL_QUESTIONS = (
-    Question(
+    CellQuestion(
         "number", "Tool number, T of the G-code", "the CAM's tool list", "whole", 1, "tool.1", needed=True
     ),
-    Question(
+    CellQuestion(
         "model",
         "Which cutter is it?",
         "the CAM's tool list",
@@ -326,7 +326,7 @@ TOOL_QUESTIONS = (
         needed=True,
         choices=lambda _: [*((name, "") for name in library.names("tools")), (OTHER, "another one")],
     ),
-    Question(
+    CellQuestion(
         "kind",
         "Its shape",
         "the CAM's tool list",
@@ -336,7 +336,7 @@ TOOL_QUESTIONS = (
         when=_is("model", OTHER),
         choices=_choices(("flat", ""), ("bull-nose", ""), ("ball", ""), ("tapered", ""), ("drill", "")),
     ),
-    Question(
+    CellQuestion(
         "diameter_mm",
         "Its diameter in mm",
         "the cutter's shank or catalogue",
@@ -346,7 +346,7 @@ TOOL_QUESTIONS = (
         needed=True,
         when=_is("model", OTHER),
     ),
-    Question(
+    CellQuestion(
         "teeth",
         "Its number of teeth",
         "the cutter",
@@ -356,7 +356,7 @@ TOOL_QUESTIONS = (
         needed=True,
         when=_is("model", OTHER),
     ),
-    Question(
+    CellQuestion(
         "corner_radius_mm",
         "Its corner radius in mm",
         "the cutter's catalogue",
@@ -366,7 +366,7 @@ TOOL_QUESTIONS = (
         needed=True,
         when=_is("kind", "bull-nose"),
     ),
-    Question(
+    CellQuestion(
         "length_mm",
         "Its length from the spindle's gauge line to the tip, in mm",
         "tool presetter, or the CAM's tool list",
@@ -374,7 +374,7 @@ TOOL_QUESTIONS = (
         112.5,
         "tool.1.length_mm",
     ),
-    Question(
+    CellQuestion(
         "data",
         "Its TOOL_DATA number",
         _TOOL_MENU,
@@ -384,7 +384,7 @@ TOOL_QUESTIONS = (
         when=_is("tools_by", "number"),
         choices=lambda controller: [(str(one.number), one.text()) for one in controller.tools],
     ),
-    Question(
+    CellQuestion(
         "frame",
         f"Its frame: {_FRAME}",
         _TOOL_MENU,
@@ -395,7 +395,7 @@ TOOL_QUESTIONS = (
         when=_is("tools_by", "number"),
         proposal=lambda controller, answers: _entry(controller.tools, answers.get("data")),
     ),
-    Question(
+    CellQuestion(
         "axis",
         "Which axis of its frame points from the tip to the holder?",
         _AXIS_PLACE,
@@ -409,7 +409,7 @@ TOOL_QUESTIONS = (
 """Asked of each tool."""
 
 MACHINE_QUESTIONS = (
-    Question(
+    CellQuestion(
         "tool_change",
         "How are tools changed?",
         "your magazine's program, if there is one",
@@ -422,7 +422,7 @@ MACHINE_QUESTIONS = (
             ("none", "never: one tool a program"),
         ),
     ),
-    Question(
+    CellQuestion(
         "magazine",
         "Name of that subprogram; it takes the tool's number (INT :IN)",
         "the Navigator, R1\\Program",
@@ -431,7 +431,7 @@ MACHINE_QUESTIONS = (
         needed=True,
         when=_is("tool_change", "magazine"),
     ),
-    Question(
+    CellQuestion(
         "mounted_tool",
         "Tool that is in the spindle when a program starts without a T word; empty: none",
         "look into the spindle",
@@ -439,7 +439,7 @@ MACHINE_QUESTIONS = (
         1,
         "tool.1",
     ),
-    Question(
+    CellQuestion(
         "load_kg",
         "Mass on the flange in kg: spindle, bracket, sensor, holder and tool",
         "Start-up > Calibrate > Tool > Payload data (M)",
@@ -448,7 +448,7 @@ MACHINE_QUESTIONS = (
         "load.mass_kg",
         proposal=_mass,
     ),
-    Question(
+    CellQuestion(
         "load_centre_mm",
         "Its centre of gravity in the flange frame: X Y Z in mm",
         "Start-up > Calibrate > Tool > Payload data (X, Y, Z)",
@@ -459,7 +459,7 @@ MACHINE_QUESTIONS = (
         when=_states("load_kg"),
         proposal=_centre,
     ),
-    Question(
+    CellQuestion(
         "load_inertia_kgm2",
         "Its inertia about x, y and z in kg m2; empty: 0",
         "Start-up > Calibrate > Tool > Payload data (JX, JY, JZ)",
@@ -470,7 +470,7 @@ MACHINE_QUESTIONS = (
         when=_states("load_kg"),
         proposal=_inertia,
     ),
-    Question(
+    CellQuestion(
         "spindle_max_rpm",
         "Largest speed of the spindle in rpm; with an analog output the speed at its full value",
         "the spindle's plate, and its drive's settings",
@@ -478,7 +478,7 @@ MACHINE_QUESTIONS = (
         18000.0,
         "spindle.max_rpm",
     ),
-    Question(
+    CellQuestion(
         "spindle_speed",
         "How is its speed set?",
         "Configuration > Inputs/outputs, and the wiring of the drive",
@@ -490,7 +490,7 @@ MACHINE_QUESTIONS = (
             ("drive", "at its drive, by hand; the robot only switches it on and off"),
         ),
     ),
-    Question(
+    CellQuestion(
         "speed_output",
         "Number of the analog output, $ANOUT[n]",
         "Display > Inputs/outputs > Analog I/O",
@@ -500,7 +500,7 @@ MACHINE_QUESTIONS = (
         needed=True,
         when=_is("spindle_speed", "analog"),
     ),
-    Question(
+    CellQuestion(
         "run_output",
         "Digital output that runs the spindle clockwise, $OUT[n]",
         _OUTPUTS,
@@ -508,7 +508,7 @@ MACHINE_QUESTIONS = (
         11,
         "spindle.run_cw_output",
     ),
-    Question(
+    CellQuestion(
         "ccw_output",
         "Digital output that runs it counter-clockwise; empty: none",
         _OUTPUTS,
@@ -517,7 +517,7 @@ MACHINE_QUESTIONS = (
         "spindle.run_ccw_output",
         when=_states("run_output"),
     ),
-    Question(
+    CellQuestion(
         "at_speed_input",
         "Digital input that is on at speed, $IN[n]; empty: there is none",
         _OUTPUTS,
@@ -526,7 +526,7 @@ MACHINE_QUESTIONS = (
         "spindle.at_speed_input",
         when=_states("run_output"),
     ),
-    Question(
+    CellQuestion(
         "start_s",
         "Seconds to run up",
         "a watch",
@@ -535,7 +535,7 @@ MACHINE_QUESTIONS = (
         "spindle.start_s",
         when=lambda answers: bool(answers.get("run_output")) and not answers.get("at_speed_input"),
     ),
-    Question(
+    CellQuestion(
         "stop_s",
         "Seconds to stop",
         "a watch",
@@ -544,7 +544,7 @@ MACHINE_QUESTIONS = (
         "spindle.stop_s",
         when=_states("run_output"),
     ),
-    Question(
+    CellQuestion(
         "flood_output",
         "Digital output of flood coolant or suction (M8); empty: none",
         _OUTPUTS,
@@ -552,7 +552,7 @@ MACHINE_QUESTIONS = (
         13,
         "spindle.flood_output",
     ),
-    Question(
+    CellQuestion(
         "mist_output",
         "Digital output of mist or air blast (M7); empty: none",
         _OUTPUTS,

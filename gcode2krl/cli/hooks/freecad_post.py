@@ -319,12 +319,12 @@ def shown(text, gcode):
     """Show findings in the report view, each with its operation; return them."""
     lines = []
     for line in text.splitlines():
-        found = FINDING.match(line)
-        if found is not None and found["line"]:
-            operation = operation_at(gcode, int(found["line"]))
+        finding = FINDING.match(line)
+        if finding is not None and finding["line"]:
+            operation = operation_at(gcode, int(finding["line"]))
             if operation:
-                line = f"{line[: found.end('line')]}, {operation}{line[found.end('line') :]}"
-        say(found["severity"] if found is not None else "note", line)
+                line = f"{line[: finding.end('line')]}, {operation}{line[finding.end('line') :]}"
+        say(finding["severity"] if finding is not None else "note", line)
         lines.append(line)
     return lines
 
@@ -332,9 +332,9 @@ def shown(text, gcode):
 def operation_at(gcode, number):
     """Return the label of the operation that a line of G-code belongs to."""
     for line in reversed(gcode.splitlines()[:number]):
-        found = OPERATION.match(line)
-        if found is not None:
-            return found[1]
+        operation = OPERATION.match(line)
+        if operation is not None:
+            return operation[1]
     return ""
 
 

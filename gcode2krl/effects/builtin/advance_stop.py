@@ -8,7 +8,7 @@ from gcode2krl.arrays import Ints
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class AdvanceStop(Effect):
@@ -33,7 +33,6 @@ class AdvanceStop(Effect):
             nominal=0.0,
             start=3.0,
             minimum=0.0,
-            role=Role.SIZE,
             source="each WAIT or output outside a TRIGGER is one",
         ),
         Parameter(
@@ -45,7 +44,6 @@ class AdvanceStop(Effect):
             start=0.1,
             grid=(0.0, 0.1, 0.5),
             minimum=0.0,
-            role=Role.SHAPE,
             source="a mere stop, a cycle of the submit interpreter, a WAIT SEC",
         ),
     )

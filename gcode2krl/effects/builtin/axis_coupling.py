@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import N_PER_KN, RAD_PER_DEG
 
 
@@ -31,7 +31,6 @@ class AxisCoupling(Effect):
             nominal=0.0,
             start=0.001,
             linear=True,
-            role=Role.SIZE,
             source="a parallelogram whose rods differ by 0.1-1 % of their length",
         ),
         Parameter(
@@ -42,7 +41,6 @@ class AxisCoupling(Effect):
             nominal=0.0,
             start=0.01,
             linear=True,
-            role=Role.SIZE,
             source="a tenth of what a gear of a large arm twists, 0.006-0.06",
         ),
     )

@@ -8,7 +8,7 @@ from gcode2krl.effects.chain import rotation_of
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import RAD_PER_MRAD
 
 _PARALLEL = "A3"
@@ -37,7 +37,6 @@ class AxisParallelism(Effect):
             nominal=0.0,
             start=0.2,
             linear=True,
-            role=Role.SIZE,
             source="machined castings 0.05-0.5 mrad; up to 2 identified on uncalibrated arms",
         ),
     )

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import play
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -34,7 +34,6 @@ class Backlash(Effect):
             nominal=0.0,
             start=0.01,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.play_deg,
             source="reversal error of a large KUKA 0.3-1 arcmin; worn gears several times that",
         ),

@@ -7,7 +7,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role, phase_parameter, size_from_zero
+from gcode2krl.effects.parameter import Parameter, phase_parameter, size_from_zero
 from gcode2krl.units import RAD_PER_MRAD, RAD_PER_REV
 
 SPINDLE = "spindle"
@@ -23,7 +23,6 @@ def _per_turn(low: float, start: float, grid: tuple[float, ...], source: str) ->
         start=start,
         grid=grid,
         minimum=0.0,
-        role=Role.SHAPE,
         source=source,
     )
 

@@ -8,7 +8,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
+from gcode2krl.effects.parameter import Parameter, size_from_zero
 from gcode2krl.units import N_PER_KN, RAD_PER_DEG
 
 
@@ -42,7 +42,6 @@ class BeltWindUp(Effect):
             start=5.0,
             grid=(2.0, 20.0),
             minimum=1e-2,
-            role=Role.SHAPE,
             source="polyurethane and rubber belts relax within seconds to minutes",
         ),
     )

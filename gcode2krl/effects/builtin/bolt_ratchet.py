@@ -11,7 +11,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters, size_from_zero
+from gcode2krl.effects.parameter import DIRECTION, Parameter, direction_parameters, size_from_zero
 from gcode2krl.effects.signals import Signals
 from gcode2krl.units import RAD_PER_DEG
 
@@ -71,7 +71,6 @@ class BoltRatchet(_Ratchet):
             start=150.0,
             grid=(80.0, 300.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="friction of a loose clamp some 10 N, of a bolted flange kilonewtons",
         ),
         *direction_parameters("any"),
@@ -115,7 +114,6 @@ class JointRatchet(_Ratchet):
             start=200.0,
             grid=(100.0, 1000.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="loose clamps of a wrist some 10 N·m, flanges of a large arm kilonewton metres",
         ),
     )
@@ -124,8 +122,8 @@ class JointRatchet(_Ratchet):
         """Return a typical step at the middle of the torques of the run."""
         torque_Nm = np.abs(inputs.own_torque_Nm[:, JOINTS.index(target or "")])
         middle_Nm = (torque_Nm.max(initial=0.0) + torque_Nm.min(initial=np.inf)) / 2.0
-        own = super().start(inputs, target)
-        return own | {"threshold_Nm": float(middle_Nm)} if 0.0 < middle_Nm < np.inf else own
+        start = super().start(inputs, target)
+        return start | {"threshold_Nm": float(middle_Nm)} if 0.0 < middle_Nm < np.inf else start
 
     def gear(self, q_load_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return what is behind the gear."""

@@ -6,7 +6,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import CLOCKS, Clock, Signals
 
 _LINKS = {
@@ -40,7 +40,6 @@ class WrongClock(Effect):
             high=0.5,
             nominal=0.0,
             start=0.01,
-            role=Role.SIZE,
             source="tables started by hand or over a network up to some 0.1 s; interpolator 40-100 ms ahead",
         ),
         Parameter(
@@ -52,7 +51,6 @@ class WrongClock(Effect):
             start=1e-4,
             linear=True,
             minor=True,
-            role=Role.SIZE,
             source="free quartz oscillators 10-100 ppm, a wrong cycle time 1000 ppm",
         ),
     )

@@ -57,7 +57,6 @@ class Collision(Effect):
             start=0.06,
             grid=(0.06,),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="half a period of an arm at 7-25 Hz is 20-70 ms; a snag that gives way some tenths of a s",
         ),
         *direction_parameters("any"),

@@ -8,7 +8,7 @@ import numpy as np
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class Corner(Effect):
@@ -32,7 +32,6 @@ class Corner(Effect):
             nominal=math.nan,
             start=1.0,
             minimum=0.0,
-            role=Role.SIZE,
             source="$APO.CDIS of milling programs 0.05-5 mm; KUKA's examples up to 50 mm",
         ),
     )

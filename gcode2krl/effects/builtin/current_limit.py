@@ -9,7 +9,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import JOINTS, Applied, Effect, Target, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import limited
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 _SMALLER = 0.8
@@ -40,7 +40,6 @@ class CurrentLimit(Effect):
             nominal=math.nan,
             start=100.0,
             minimum=0.01,
-            role=Role.SIZE,
             source="axes of large arms reach 100-150 deg/s in 0.3-1 s: 100-500 deg/s2; wrists some 1000",
         ),
         Parameter(
@@ -52,7 +51,6 @@ class CurrentLimit(Effect):
             start=30.0,
             grid=(30.0,),
             minimum=0.1,
-            role=Role.SHAPE,
             source="position loops of robots 10-50 1/s",
         ),
     )
@@ -63,8 +61,8 @@ class CurrentLimit(Effect):
 
     def start(self, inputs: Inputs, target: Target = None) -> dict[str, float]:
         """Return a limit a fifth below that."""
-        own = self.nominal(inputs, target)
-        return own | {"limit_deg_s2": _SMALLER * own["limit_deg_s2"]}
+        nominal = self.nominal(inputs, target)
+        return nominal | {"limit_deg_s2": _SMALLER * nominal["limit_deg_s2"]}
 
     def servo(self, q_act_rad: Floats, inputs: Inputs, applied: Applied) -> Floats:
         """Return the motor side."""

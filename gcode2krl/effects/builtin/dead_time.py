@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs, resampled
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class DeadTime(Effect):
@@ -32,7 +32,6 @@ class DeadTime(Effect):
             start=0.01,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.lag_s,
             source="1-3 cycles of 4 or 12 ms between interpolator and drives; filtered commands 40-100 ms",
         ),

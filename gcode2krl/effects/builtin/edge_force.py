@@ -6,7 +6,7 @@ from gcode2krl.effects.coefficients import with_scaled_edge
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class EdgeForce(Effect):
@@ -32,7 +32,6 @@ class EdgeForce(Effect):
             start=1.5,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.coefficients,
             source="edge coefficients grow by factors over a tool's life, cutting ones hardly",
         ),

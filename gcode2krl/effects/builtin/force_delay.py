@@ -5,7 +5,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs, resampled
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class ForceDelay(Effect):
@@ -28,7 +28,6 @@ class ForceDelay(Effect):
             nominal=0.0,
             start=0.02,
             minimum=0.0,
-            role=Role.SIZE,
             source="force chain plus the robot's reaction 100-150 ms, the chain alone 5-50 ms",
         ),
     )

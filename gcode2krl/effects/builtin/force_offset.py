@@ -6,7 +6,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _NAMES = ("fx_N", "fy_N", "fz_N")
 
@@ -29,7 +29,6 @@ class ForceOffset(Effect):
             nominal=0.0,
             start=10.0,
             linear=True,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.force_zero_N,
             source="zeroed under a load, or in another orientation: up to the tool's weight",
         )

@@ -6,7 +6,7 @@ from gcode2krl.effects.coefficients import with_scaled_direction
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _DIRECTIONS = ("tangential", "radial", "axial")
 
@@ -35,7 +35,6 @@ class ForceScale(Effect):
             start=1.2,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.coefficients,
             source="coefficients of a prior are 30-50 % off; wear +20-100 %",
         ),

@@ -6,7 +6,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class ForceSteps(Effect):
@@ -30,7 +30,6 @@ class ForceSteps(Effect):
             nominal=0.0,
             start=5.0,
             minimum=0.0,
-            role=Role.SIZE,
             source="12 bit over ± 20 kN 10 N, 16 bit 0.6 N; tables in whole N or tens of them",
         ),
     )

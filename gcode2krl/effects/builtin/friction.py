@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
+from gcode2krl.effects.parameter import Parameter, size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -37,7 +37,6 @@ class Friction(Effect):
             start=0.15,
             grid=(0.05, 0.15, 0.4),
             minimum=1e-4,
-            role=Role.SHAPE,
             source="integral action of position loops 0.05-0.5 s",
         ),
     )

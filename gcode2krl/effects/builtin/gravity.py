@@ -6,7 +6,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.weight import with_weight
 
 _CENTRE = ("cx_mm", "cy_mm", "cz_mm")
@@ -33,7 +33,6 @@ class Gravity(Effect):
             nominal=0.0,
             start=10.0,
             linear=True,
-            role=Role.SIZE,
             source="stated payloads are 2-5 % off; a forgotten part of the end effector 5-50 kg",
         ),
         *(
@@ -44,7 +43,6 @@ class Gravity(Effect):
                 high=1000.0,
                 nominal=None,
                 start=start,
-                role=Role.SHAPE,
                 source="from the tip, z towards the holder; an end effector is 100-500 mm long",
             )
             for name, start in zip(_CENTRE, (0.0, 0.0, 200.0), strict=True)

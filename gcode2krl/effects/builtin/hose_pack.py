@@ -10,7 +10,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _H0 = ("h0_x_N", "h0_y_N", "h0_z_N")
 _H = tuple(f"H_{row}{column}_N_rad" for row in "xyz" for column in "xyz")
@@ -40,7 +40,6 @@ class HosePack(Effect):
                 nominal=0.0,
                 start=10.0,
                 linear=True,
-                role=Role.SIZE,
                 source=_SOURCE,
             )
             for name in _H0
@@ -54,7 +53,6 @@ class HosePack(Effect):
                 nominal=0.0,
                 start=20.0,
                 linear=True,
-                role=Role.SIZE,
                 source=_SOURCE,
             )
             for name in _H

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs, gradient
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class JerkFeedForward(Effect):
@@ -33,7 +33,6 @@ class JerkFeedForward(Effect):
             nominal=0.0,
             start=-1e-6,
             linear=True,
-            role=Role.SIZE,
             source="product of the loops' time constants: 1, 5 and 30 ms are 1.5e-7, soft loops 1e-5",
         ),
         Parameter(
@@ -45,7 +44,6 @@ class JerkFeedForward(Effect):
             start=0.01,
             grid=(0.01,),
             minimum=1e-4,
-            role=Role.SHAPE,
             source="velocity loops of drives settle within 4-25 ms",
         ),
     )

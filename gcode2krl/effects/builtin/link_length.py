@@ -7,7 +7,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _LENGTHS = ("a1", "a2", "c1", "c2", "c3", "c4")
 
@@ -29,7 +29,6 @@ class LinkLength(Effect):
             nominal=0.0,
             start=0.5,
             linear=True,
-            role=Role.SIZE,
             source="uncalibrated absolute accuracy of large arms 1-3 mm",
         ),
     )

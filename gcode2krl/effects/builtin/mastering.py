@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -28,7 +28,6 @@ class Mastering(Effect):
             nominal=0.0,
             start=0.02,
             linear=True,
-            role=Role.SIZE,
             source="uncalibrated accuracy of 1-3 mm is 0.02-0.1 deg; a slipped mark up to 2 deg",
         ),
     )

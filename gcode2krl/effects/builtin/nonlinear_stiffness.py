@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
+from gcode2krl.effects.parameter import Parameter, size_from_zero
 from gcode2krl.units import RAD_PER_DEG
 
 
@@ -40,7 +40,6 @@ class NonlinearStiffness(Effect):
             start=100.0,
             grid=(30.0, 100.0, 300.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="3 % of the rated torque of gears of 1-10 kN·m",
         ),
     )

@@ -47,7 +47,6 @@ class PedestalCompliance(Effect):
             start=500.0,
             grid=(0.0, 700.0),
             minimum=0.0,
-            role=Role.SHAPE,
             source="a robot on the floor has none below it, pedestals are 0.3-1 m high",
         ),
         Parameter(

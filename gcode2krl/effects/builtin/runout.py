@@ -14,7 +14,7 @@ from gcode2krl.effects.coefficients import edge_only
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import NO_TARGET, Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import RAD_PER_DEG, RAD_PER_REV
 
 
@@ -44,7 +44,6 @@ class Runout(Effect):
             nominal=0.0,
             start=0.02,
             minimum=0.0,
-            role=Role.SIZE,
             source="10-30 µm of a milling spindle with collet",
         ),
         Parameter(
@@ -55,7 +54,6 @@ class Runout(Effect):
             nominal=None,
             start=0.0,
             grid=(0.0, 30.0, 60.0, 90.0),
-            role=Role.SHAPE,
             source="between the offset and a tooth: as the cutter happens to sit in its collet",
         ),
     )

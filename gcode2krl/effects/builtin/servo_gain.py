@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _K_V_PER_S = 30.0
 
@@ -36,7 +36,6 @@ class ServoGain(Effect):
             nominal=0.0,
             start=0.3,
             linear=True,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.lag_s * _K_V_PER_S,
             source="0 with all of the speed fed forward, 1 with none; above it a loop leads",
         ),
@@ -49,7 +48,6 @@ class ServoGain(Effect):
             start=_K_V_PER_S,
             grid=(_K_V_PER_S,),
             minimum=0.1,
-            role=Role.SHAPE,
             source="position loops of robots 10-50 1/s, of machine tools up to 170 (10 m/min per mm)",
         ),
     )

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class ServoLag(Effect):
@@ -34,7 +34,6 @@ class ServoLag(Effect):
             start=0.01,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.lag_s,
             source="servo lag of large arms 10-30 ms",
         ),

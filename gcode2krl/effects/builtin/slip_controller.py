@@ -12,7 +12,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role, size_from_zero
+from gcode2krl.effects.parameter import Parameter, size_from_zero
 from gcode2krl.effects.weight import with_weight
 from gcode2krl.units import RAD_PER_DEG
 
@@ -41,7 +41,6 @@ class RsiOn(Effect):
             nominal=None,
             start=0.1,
             grid=(0.0, 0.05, 0.1, 0.15),
-            role=Role.SHAPE,
             source="force chain and robot's reaction 100-150 ms; pilot forces take it off",
         ),
     )
@@ -85,7 +84,6 @@ class WrongLoad(Effect):
             nominal=0.0,
             start=30.0,
             linear=True,
-            role=Role.SIZE,
             source="load data of another tool, or none: up to the rated payload",
         ),
         *(
@@ -96,7 +94,6 @@ class WrongLoad(Effect):
                 high=500.0,
                 nominal=None,
                 start=0.0,
-                role=Role.SHAPE,
                 source="centres of the tools of one cell: some hundred millimetres apart",
             )
             for name in _FURTHER
@@ -144,7 +141,6 @@ class AbsoluteAccuracy(Effect):
             nominal=0.0,
             start=0.02,
             linear=True,
-            role=Role.SIZE,
             source="uncalibrated accuracy of 1-3 mm is 0.02-0.1 deg",
         )
         for name in _OFFSETS

@@ -6,7 +6,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import Signals
 from gcode2krl.errors import input_error
 
@@ -55,7 +55,6 @@ class Unit(Effect):
             nominal=1.0,
             start=1000.0,
             minimum=1e-9,
-            role=Role.SIZE,
             source="1000, 25.4, 57.3 and their inverses",
         ),
     )

@@ -102,11 +102,11 @@ def _with_joints(inputs: Inputs, position_mm: Floats, rotation: Floats) -> Input
     quaternion = fr.quaternion_from_rotation(rotation)
     for number, rows in arm.tool_rows(inputs.tool):
         before = inputs.q_cmd_rad[rows][:, None, :]
-        found = robot.inverse(position_mm[rows], quaternion[rows], inputs.cell, number)
-        found = before + (found - before + np.pi) % (2.0 * np.pi) - np.pi
-        way = np.abs(found - before).max(axis=2)
+        q_rad = robot.inverse(position_mm[rows], quaternion[rows], inputs.cell, number)
+        q_rad = before + (q_rad - before + np.pi) % (2.0 * np.pi) - np.pi
+        way = np.abs(q_rad - before).max(axis=2)
         nearest = np.argmin(np.where(np.isnan(way), np.inf, way), axis=1)
-        q[rows] = found[np.arange(len(found)), nearest]
+        q[rows] = q_rad[np.arange(len(q_rad)), nearest]
     if np.isnan(q).any():
         raise input_error("effect-impossible", "with this frame the path is out of the robot's reach")
     moved = replace(inputs, q_cmd_rad=q)

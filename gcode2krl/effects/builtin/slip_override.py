@@ -5,7 +5,7 @@ from dataclasses import replace
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class Override(Effect):
@@ -30,7 +30,6 @@ class Override(Effect):
             nominal=100.0,
             start=50.0,
             minimum=0.1,
-            role=Role.SIZE,
             source="the switch goes to 100 %; programs made at half speed look like 200 %",
         ),
     )

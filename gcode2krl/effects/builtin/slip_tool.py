@@ -8,7 +8,7 @@ from gcode2krl.effects.coefficients import with_larger_tools
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import Signals
 
 _SURE_LENGTH_MM = 0.1
@@ -37,7 +37,6 @@ class SwappedTool(Effect):
             high=30.0,
             nominal=0.0,
             start=2.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.diameter_mm,
             source="the next tool of a rack: 1-10 mm",
         ),
@@ -49,7 +48,6 @@ class SwappedTool(Effect):
             nominal=0.0,
             start=5.0,
             linear=True,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.length_mm,
             source="another length of the same cutter: 5-100 mm",
         ),

@@ -7,7 +7,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.units import RAD_PER_REV, S_PER_MIN, UM_PER_MM
 
 _RPM_PER_RAD_S = S_PER_MIN / RAD_PER_REV
@@ -35,7 +35,6 @@ class SpindleGrowth(Effect):
             nominal=0.0,
             start=2.0,
             linear=True,
-            role=Role.SIZE,
             source="motor spindles grow 20-60 µm at 10-24 krpm; centrifugal force shortens fast ones",
         ),
         Parameter(
@@ -47,7 +46,6 @@ class SpindleGrowth(Effect):
             start=60.0,
             grid=(3.0, 60.0, 600.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="a shaft and its bearings some seconds to minutes, the housing 10-30 min",
         ),
     )

@@ -92,7 +92,6 @@ class JointStep(_Step):
             nominal=0.0,
             start=0.01,
             linear=True,
-            role=Role.SIZE,
             source="a coupling or a clamped hub slips 0.005-0.1 deg; a tooth of a belt about 1 deg",
         ),
     )

@@ -7,7 +7,7 @@ from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_virtual_joint
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class Stiffness(Effect):
@@ -29,7 +29,6 @@ class Stiffness(Effect):
             nominal=1.0,
             start=0.8,
             minimum=0.01,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.stiffness,
             source="identified within 8 % (Haehn & Weigold 2020); a worn bearing or another arm: factors",
         ),

@@ -7,7 +7,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _AXES = ("x", "y")
 
@@ -32,7 +32,6 @@ class StockOffset(Effect):
             high=10.0,
             nominal=0.0,
             start=0.5,
-            role=Role.SIZE,
             source="a sawn block against stops 0.5-2 mm, clamped by eye several mm",
         ),
     )

@@ -8,7 +8,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import DIRECTION, Parameter, Role, direction_parameters, size_from_zero
+from gcode2krl.effects.parameter import DIRECTION, Parameter, direction_parameters, size_from_zero
 
 
 class Thermal(Effect):
@@ -36,7 +36,6 @@ class Thermal(Effect):
             start=1.0,
             grid=(0.3, 1.0, 3.0),
             minimum=1e-3,
-            role=Role.SHAPE,
             source="warming up of large arms takes 1-3 h",
         ),
         *direction_parameters("along the arm and downwards are usual"),

@@ -7,7 +7,7 @@ from gcode2krl.effects.coefficients import with_larger_tools
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import Signals
 
 
@@ -30,7 +30,6 @@ class ToolDiameter(Effect):
             high=2.0,
             nominal=0.0,
             start=0.05,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.diameter_mm,
             source="new end mills -0.03 mm, reground ones to -0.5 mm",
         ),

@@ -4,7 +4,7 @@ from gcode2krl.effects.arm import Load
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class ToolWeight(Effect):
@@ -27,7 +27,6 @@ class ToolWeight(Effect):
             nominal=0.0,
             start=20.0,
             linear=True,
-            role=Role.SIZE,
             source="a tool and holder weigh 10-50 N, a spindle 200-500 N",
         ),
     )

@@ -8,7 +8,7 @@ from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.effects.operators import lag
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import Signals
 
 
@@ -36,7 +36,6 @@ class TrackerFilter(Effect):
             start=0.01,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             source="trackers state means over 1-100 ms, the smoothing of their software up to 0.5 s",
         ),
     )

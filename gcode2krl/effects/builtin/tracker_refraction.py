@@ -9,7 +9,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 from gcode2krl.effects.signals import Signals
 from gcode2krl.units import MM_PER_M
 
@@ -40,7 +40,6 @@ class TrackerRefraction(Effect):
             nominal=0.0,
             start=1.0,
             linear=True,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.air_K_m,
             source="halls 0.2-2 K/m, above heaters and machines 10 K/m",
         ),
@@ -53,7 +52,6 @@ class TrackerRefraction(Effect):
                 nominal=None,
                 start=start,
                 grid=grid,
-                role=Role.SHAPE,
                 source="trackers stand 2-10 m away",
             )
             for name, start, grid in zip(_STAND, (5.0, 0.0), ((-5.0, 5.0), (-5.0, 5.0)), strict=True)

@@ -35,7 +35,6 @@ class Transmission(MotorEffect):
             start=0.004,
             linear=True,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.play_deg,
             source="1-60 arcsec at once and twice a turn of the motor",
         ),

@@ -5,7 +5,7 @@ import math
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 _OWN = math.nan
 
@@ -32,7 +32,6 @@ class VelocityRule(Effect):
             nominal=_OWN,
             start=0.2,
             minimum=0.0,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.k_s,
             source="0.168 s measured on one KR 210 (Bigliardi et al. 2022); others unknown",
         ),
@@ -44,7 +43,6 @@ class VelocityRule(Effect):
             nominal=_OWN,
             start=1.5,
             minimum=0.01,
-            role=Role.SIZE,
             usual=lambda mismatch: mismatch.acc_m_s2,
             source="$ACC.CP of programs 0.5-5 m/s2, drives of large arms up to 10",
         ),
@@ -62,9 +60,9 @@ class VelocityRule(Effect):
 
     def replan(self, inputs: Inputs, applied: Applied) -> Inputs:
         """Return the inputs of the motion with these constants."""
-        own = self.nominal(inputs)
-        used = {name: own[name] if math.isnan(applied[name]) else applied[name] for name in own}
-        if used == own or inputs.targets is None:
+        nominal = self.nominal(inputs)
+        used = {name: nominal[name] if math.isnan(applied[name]) else applied[name] for name in nominal}
+        if used == nominal or inputs.targets is None:
             return inputs
         controller = inputs.cell.controller.model_copy(update=used)
         return inputs.replanned(inputs.targets, inputs.cell.model_copy(update={"controller": controller}))

@@ -53,7 +53,6 @@ class Vibration(Effect):
             start=0.03,
             grid=(0.03,),
             minimum=0.0,
-            role=Role.SHAPE,
             source="structural damping 1-6 %",
         ),
         Parameter(
@@ -64,7 +63,6 @@ class Vibration(Effect):
             nominal=0.0,
             start=0.5,
             minimum=0.0,
-            role=Role.SIZE,
             source="share of the mode in the static deflection; above 1 where several act as one",
         ),
         *direction_parameters("any"),

@@ -6,7 +6,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, Target
 from gcode2krl.effects.inputs import Inputs
-from gcode2krl.effects.parameter import Parameter, Role
+from gcode2krl.effects.parameter import Parameter
 
 
 class WristCoupling(Effect):
@@ -30,7 +30,6 @@ class WristCoupling(Effect):
             nominal=0.0,
             start=0.001,
             linear=True,
-            role=Role.SIZE,
             source="couplings of hollow wrists are 1/50-1/200 before the controller takes them out",
         ),
     )

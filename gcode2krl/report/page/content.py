@@ -1,11 +1,14 @@
 """What the page shows, from the tables of a prediction or from what is known of a refused program."""
 
+import zlib
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
@@ -15,10 +18,8 @@ from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.errors import Issue, Told, told
 from gcode2krl.frames import invert, quaternion_from_rotation
 from gcode2krl.prediction import Prediction
-from gcode2krl.report.page.coarse import drawn_mesh
-from gcode2krl.report.page.columns import packed, packed_text
 from gcode2krl.report.page.losses import (
-    Place,
+    NotableSample,
     Window,
     is_worth_saying,
     lost_time,
@@ -27,11 +28,94 @@ from gcode2krl.report.page.losses import (
     worst_windows,
 )
 from gcode2krl.report.page.passes import passes_of
-from gcode2krl.report.page.samples import Quantity, Samples, samples_of, samples_of_path, thinned
+from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
+
+# Columns of numbers as the page carries them: whole multiples of a step, differences, bytes by their
+# weight.
+#
+# Neighbouring samples differ little, so that the upper bytes of the differences are nearly all alike and
+# deflate takes them to almost nothing. `data.js` reads it back.
+
+MISSING = -(2**31)
+"""Stands for a value that is not known (NaN)."""
+_LARGEST = 2.0**30
+_LEVEL = 6
+"""9 saves 3 % of the size and takes twelve times as long."""
+
+
+def packed(columns: Mapping[str, tuple[npt.ArrayLike, float]]) -> tuple[str, list[dict[str, Any]]]:
+    """Return columns of equal length as text in base 64, and the name and step of each in their order.
+
+    Parameters
+    ----------
+    columns : name → values (m,) and the step to which they are rounded, in the values' unit. A step that is
+        too small for 31 bits is made larger.
+    """
+    described, parts = [], []
+    for name, (given, wanted) in columns.items():
+        values = np.asarray(given, dtype=np.float64)
+        present = np.isfinite(values)
+        largest = float(np.abs(values, where=present, out=np.zeros(len(values))).max(initial=0.0))
+        step = max(wanted, largest / _LARGEST)
+        whole = np.full(len(values), MISSING, dtype=np.int64)
+        whole[present] = np.rint(values[present] / step).astype(np.int64)
+        parts.append(_bytes_by_weight(whole))
+        described.append({"name": name, "step": step})
+    return b64encode(zlib.compress(b"".join(parts), _LEVEL)).decode("ascii"), described
+
+
+def packed_text(text: str) -> str:
+    """Return a text compressed and in base 64."""
+    return b64encode(zlib.compress(text.encode("utf-8", "replace"), _LEVEL)).decode("ascii")
+
+
+def _bytes_by_weight(whole: Ints) -> bytes:
+    """Return the differences modulo 2³² of whole numbers (m,): all lowest bytes, then all second, …"""
+    differences = np.diff(whole, prepend=np.zeros(1, dtype=np.int64)) & 0xFFFFFFFF
+    return differences.astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+# A mesh with few triangles, to be looked at: what lies in one cell of a grid becomes one corner.
+#
+# Not for distances: a corner moves by up to the diagonal of a cell.
+
+MOST_TRIANGLES = 4000
+"""Triangles that a page draws of one mesh, some 30 kB."""
+_FINEST = 256
+"""Cells along the longest side of the finest grid."""
+_COARSER = 0.8
+
+
+def drawn_mesh(triangles_mm: Floats, most: int = MOST_TRIANGLES) -> Floats:
+    """Return triangles (t, 3, 3) of a mesh (n, 3, 3), at most so many; all of them where they are few."""
+    cells = float(_FINEST)
+    drawn = triangles_mm
+    while len(drawn) > most and cells >= 2.0:
+        drawn = _clustered(triangles_mm, cells)
+        cells *= _COARSER
+    return drawn
+
+
+def _clustered(triangles_mm: Floats, cells: float) -> Floats:
+    """Return the triangles whose corners are in three cells of a grid with so many along its longest side."""
+    corners = triangles_mm.reshape(-1, 3)
+    low = corners.min(axis=0)
+    side_mm = max(float(np.ptp(corners, axis=0).max()), 1e-9) / cells
+    place = np.floor((corners - low) / side_mm).astype(np.int64)
+    number = (place[:, 0] * (_FINEST + 1) + place[:, 1]) * (_FINEST + 1) + place[:, 2]
+    _, cell, count = np.unique(number, return_inverse=True, return_counts=True)
+    middle = np.stack([np.bincount(cell, corners[:, k]) / count for k in range(3)], axis=1)
+    faces = cell.reshape(-1, 3)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    drawn: Floats = middle[faces[np.sort(first)]]
+    return drawn
+
 
 NO_COLLISIONS = (
     "Collisions of arm, spindle, holder and cables with anything: look along the path with the slider.",
@@ -46,7 +130,7 @@ class Worst:
 
     label: str
     unit: str
-    places: list[Place]
+    places: list[NotableSample]
 
 
 @dataclass(frozen=True)
@@ -118,14 +202,25 @@ def content_of(
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
         ``triangles_mm`` (t, 3, 3). None where nobody compared.
     """
-    found = tuple(prediction.issues if issues is None else issues)
+    listed = tuple(prediction.issues if issues is None else issues)
     whole = samples_of(prediction)
     if whole is None or len(whole) == 0:
         return content_of_refused(
-            found, title=_name(prediction.toolpath), verdict=verdict, toolpath=prediction.toolpath, text=text
+            listed,
+            title=_name(prediction.toolpath),
+            verdict=verdict,
+            toolpath=prediction.toolpath,
+            text=text,
         )
     made = _content(
-        _name(prediction.toolpath), verdict, whole, found, prediction.cell, text, stock_mm, _facts(prediction)
+        _name(prediction.toolpath),
+        verdict,
+        whole,
+        listed,
+        prediction.cell,
+        text,
+        stock_mm,
+        _facts(prediction),
     )
     made = _with_meshes(_with_tool_axes(made, prediction.toolpath), meshes_mm or {})
     return made if nominal is None else _with_nominal(made, nominal, whole)
@@ -142,20 +237,20 @@ def content_of_refused(
     stock_mm: Floats | None = None,
 ) -> Content:
     """Return the page of a program of which no motion is known: findings, text, and the programmed path."""
-    found = tuple(issues)
+    listed = tuple(issues)
     rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M if cell is not None else None
     whole = samples_of_path(toolpath, rapid_mm_s) if toolpath is not None else None
     if toolpath is not None and whole is not None and len(whole) > 1:
-        made = _content(title, verdict, whole, found, cell, text, stock_mm, [])
+        made = _content(title, verdict, whole, listed, cell, text, stock_mm, [])
         return _with_tool_axes(made, toolpath)
-    shown = told(found)
+    shown = told(listed)
     return Content(
         title=title,
         verdict=verdict,
         sentence=_refusal(shown, verdict),
         told=shown,
         not_checked=["Everything after the reading of the program: path, time, forces, deflection."],
-        head=_head_without_path(found, text),
+        head=_head_without_path(listed, text),
         text=packed_text(text or ""),
     )
 
@@ -163,7 +258,7 @@ def content_of_refused(
 def _content(
     title: str,
     verdict: str,
-    whole: Samples,
+    whole: PageSamples,
     issues: tuple[Issue, ...],
     cell: Cell | None,
     text: str | None,
@@ -235,10 +330,10 @@ def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:
     )
 
 
-def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> Content:
+def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples) -> Content:
     """Return a page with the differences to the nominal part, as a table and as solids."""
     rows = thinned(whole)
-    found = [
+    deviations = [
         Deviation(
             **{key: one[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
             row=_nearest(rows, one["row"]),
@@ -251,14 +346,14 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: Samples) -> 
     points = np.concatenate(corners) if corners else np.empty((0, 3))
     solids, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
     head = content.head | {
-        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in found]},
+        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in deviations]},
     }
-    compared = Compared(found, sum(nominal["left_out"].values()), nominal["volume_mm3"])
+    compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"])
     return replace(content, head=head, solids=solids, compared=compared)
 
 
 def _carried(
-    whole: Samples, shown: Samples, cell: Cell | None
+    whole: PageSamples, shown: PageSamples, cell: Cell | None
 ) -> tuple[Cell | None, dict[str, tuple[Any, float]]]:
     """Return the cell as it is drawn, and columns with what external axes move: robot root and ``$WORLD``.
 
@@ -279,7 +374,7 @@ def _carried(
     return cell, columns
 
 
-def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:
+def _near(shown: PageSamples, cell: Cell | None) -> dict[str, Any] | None:
     """Return who may be near what, and up to which distance that is a warning."""
     if shown.near is None or cell is None:
         return None
@@ -287,7 +382,7 @@ def _near(shown: Samples, cell: Cell | None) -> dict[str, Any] | None:
     return {**names, "clearance": cell.collision.clearance_mm}
 
 
-def _columns(shown: Samples, number: Ints) -> dict[str, tuple[Any, float]]:
+def _columns(shown: PageSamples, number: Ints) -> dict[str, tuple[Any, float]]:
     """Return the columns that the page carries, with the steps to which they are rounded."""
     columns: dict[str, tuple[Any, float]] = {"time": (shown.time_s, 1e-4)}
     columns |= {axis: (shown.position_mm[:, k], 1e-3) for k, axis in enumerate("xyz")}
@@ -314,14 +409,14 @@ def _on_page(window: Window, rows: Ints) -> Window:
     return replace(window, row=_nearest(rows, window.row))
 
 
-def _worst(quantity: Quantity, whole: Samples, rows: Ints) -> Worst:
+def _worst(quantity: Quantity, whole: PageSamples, rows: Ints) -> Worst:
     sign = -1.0 if quantity.is_low_bad else 1.0
     considered = np.where(whole.rapid & (not quantity.is_margin), np.nan, sign * quantity.values)
     if not quantity.is_margin:
         considered = np.where(considered > 0.0, considered, np.nan)
     places = worst_places(considered, whole.time_s, whole.line)
-    own = [Place(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
-    return Worst(quantity.label, quantity.unit, own)
+    samples = [NotableSample(_nearest(rows, p.row), sign * p.value, p.time_s, p.line) for p in places]
+    return Worst(quantity.label, quantity.unit, samples)
 
 
 def _nearest(rows: Ints, row: int) -> int:
@@ -346,7 +441,7 @@ def _facts(prediction: Prediction) -> list[tuple[str, str]]:
     return facts
 
 
-def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
+def _not_known(whole: PageSamples, cell: Cell | None) -> list[str]:
     known = {quantity.name for quantity in whole.quantities}
     missing = []
     if not whole.is_timed:
@@ -362,7 +457,7 @@ def _not_known(whole: Samples, cell: Cell | None) -> list[str]:
     return missing
 
 
-def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
+def _collisions(whole: PageSamples, cell: Cell | None) -> list[str]:
     """Return what is not checked for collisions; where something is, also what."""
     tools = [int(number) for number in np.unique(whole.tool)]
     scope = None
@@ -377,7 +472,7 @@ def _collisions(whole: Samples, cell: Cell | None) -> list[str]:
     ]
 
 
-def _sentence(whole: Samples, lost_s: float, findings: Told, verdict: str) -> str:
+def _sentence(whole: PageSamples, lost_s: float, findings: Told, verdict: str) -> str:
     if verdict in ("refused", "not understood"):
         return _refusal(findings, verdict)
     length_m = float(np.linalg.norm(np.diff(whole.position_mm, axis=0), axis=1).sum()) / MM_PER_M
@@ -404,9 +499,9 @@ def duration(seconds: float) -> str:
     """Return a time as a person reads it."""
     if seconds < S_PER_MIN:
         return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), int(S_PER_MIN))
+    minutes, seconds_left = divmod(round(seconds), int(S_PER_MIN))
     hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds_left} s"
 
 
 def _name(toolpath: Toolpath) -> str:

@@ -19,7 +19,7 @@ _STILL_MM_S = 1e-3
 
 
 @dataclass(frozen=True)
-class Place:
+class NotableSample:
     """A sample that is worth a look."""
 
     row: int
@@ -88,7 +88,7 @@ def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -
     width_s = max(whole_s / _WINDOWS, _SHORTEST_WINDOW_S)
     slot = ((time_s - time_s[0]) / width_s).astype(np.int64)
     sums = np.bincount(slot, weights=lost_s)
-    found = []
+    moves = []
     for one in np.argsort(-sums, kind="stable")[:most]:
         rows = np.flatnonzero(slot == one)
         if sums[one] < _WORTH_NAMING * whole_lost_s:
@@ -97,19 +97,19 @@ def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -
         first, last = (int(lines.min()), int(lines.max())) if len(lines) else (0, 0)
         worst = int(rows[np.argmax(lost_s[rows])])
         start_s, end_s = float(time_s[rows[0]]), float(time_s[rows[-1]])
-        found.append(Window(worst, start_s, end_s, first, last, float(sums[one])))
-    return found
+        moves.append(Window(worst, start_s, end_s, first, last, float(sums[one])))
+    return moves
 
 
-def worst_places(values: Floats, time_s: Floats, line: Ints32, most: int = 3) -> list[Place]:
+def worst_places(values: Floats, time_s: Floats, line: Ints32, most: int = 3) -> list[NotableSample]:
     """Return the samples of the largest values, the worst first, apart in time and in different lines."""
     apart_s = _APART * float(time_s[-1] - time_s[0])
-    left = np.where(np.isfinite(values), values, -np.inf)
-    found: list[Place] = []
-    while len(found) < most:
-        row = int(np.argmax(left))
-        if not np.isfinite(left[row]):
+    remaining = np.where(np.isfinite(values), values, -np.inf)
+    samples: list[NotableSample] = []
+    while len(samples) < most:
+        row = int(np.argmax(remaining))
+        if not np.isfinite(remaining[row]):
             break
-        found.append(Place(row, float(values[row]), float(time_s[row]), int(line[row])))
-        left[(np.abs(time_s - time_s[row]) <= apart_s) | (line == line[row])] = -np.inf
-    return found
+        samples.append(NotableSample(row, float(values[row]), float(time_s[row]), int(line[row])))
+        remaining[(np.abs(time_s - time_s[row]) <= apart_s) | (line == line[row])] = -np.inf
+    return samples

@@ -66,7 +66,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Samples:
+class PageSamples:
     """Columns (m,) along the path."""
 
     time_s: Floats
@@ -90,7 +90,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def at(self, rows: Ints) -> "Samples":
+    def at(self, rows: Ints) -> "PageSamples":
         """Return some of the samples."""
         if len(rows) == len(self):
             return self
@@ -102,7 +102,7 @@ class Samples:
         return replace(self, quantities=quantities, near=near, **columns)
 
 
-def samples_of(prediction: Prediction) -> Samples | None:
+def samples_of(prediction: Prediction) -> PageSamples | None:
     """Return the samples of a prediction's motion, None where none is planned."""
     motion, toolpath = prediction.motion, prediction.toolpath
     if motion is None:
@@ -123,7 +123,7 @@ def samples_of(prediction: Prediction) -> Samples | None:
     if near is not None:
         label = "least distance"
         quantities.append(Quantity("clearance", label, "mm", near.clearance_mm, 1e-2, is_low_bad=True))
-    return Samples(
+    return PageSamples(
         time_s=motion.time_s,
         position_mm=motion.position_mm,
         speed_mm_s=motion.speed_mm_s,
@@ -139,7 +139,7 @@ def samples_of(prediction: Prediction) -> Samples | None:
     )
 
 
-def samples_of_path(toolpath: Toolpath, rapid_mm_s: float | None) -> Samples | None:
+def samples_of_path(toolpath: Toolpath, rapid_mm_s: float | None) -> PageSamples | None:
     """Return the programmed points as samples at length over programmed feed; None where there are none."""
     rows = np.flatnonzero(toolpath.is_position() & ~toolpath.machine)
     if not len(rows):
@@ -149,7 +149,7 @@ def samples_of_path(toolpath: Toolpath, rapid_mm_s: float | None) -> Samples | N
     fastest = rapid_mm_s or float(np.max(feed, where=np.isfinite(feed), initial=1.0))
     speed = np.where(np.isfinite(feed) & (feed > 0.0), feed, fastest)
     length = np.linalg.norm(np.diff(position, axis=0, prepend=position[:1]), axis=1)
-    return Samples(
+    return PageSamples(
         time_s=np.cumsum(length / speed),
         position_mm=position,
         speed_mm_s=speed,
@@ -162,7 +162,7 @@ def samples_of_path(toolpath: Toolpath, rapid_mm_s: float | None) -> Samples | N
     )
 
 
-def thinned(samples: Samples, most: int = MOST_SAMPLES) -> Ints:
+def thinned(samples: PageSamples, most: int = MOST_SAMPLES) -> Ints:
     """Return the rows that are drawn: all, or at most ``most`` with the extremes of every quantity."""
     count = len(samples)
     if count <= most:

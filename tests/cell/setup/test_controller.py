@@ -8,11 +8,16 @@ import zipfile
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.cell.setup import archive
+from gcode2krl.cell.setup import controller
 from gcode2krl.cell.setup.answers import completed
 from gcode2krl.cell.setup.cell_text import text_of_cell
-from gcode2krl.cell.setup.controller import Controller, ExternalData, controller_of, read_controller
-from gcode2krl.cell.setup.krl_data import krl_values
+from gcode2krl.cell.setup.controller import (
+    ArchivedController,
+    ExternalData,
+    controller_of,
+    krl_values,
+    read_controller,
+)
 from gcode2krl.errors import NotUnderstoodError
 from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_folder, write_zip
 from tests.conftest import ROOT
@@ -74,7 +79,7 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
     [("8.6", None, "8.6"), ("", None, ""), ("8.6", "8.7", "8.7"), ("8.6", "unknown", ""), ("", "8.5", "8.5")],
 )
 def test_the_system_software_is_that_of_the_archive_unless_it_is_answered(stated, answer, written):
-    controller = Controller(source="", kss=stated)
+    controller = ArchivedController(source="", kss=stated)
     text = text_of_cell(
         completed({} if answer is None else {"kss": answer}, controller), controller, "s.json"
     )
@@ -172,15 +177,17 @@ def test_a_damaged_zip_is_one_line(tmp_path, hanging):
 
 @pytest.mark.slow
 def test_a_bomb_is_read_no_further_than_the_limit(tmp_path):
-    bomb = zipped(tmp_path / "bomb.zip", **{"KRC/R1/System/$config.dat": b" " * (200 * archive.MOST_BYTES)})
-    assert bomb.stat().st_size < archive.MOST_BYTES
+    bomb = zipped(
+        tmp_path / "bomb.zip", **{"KRC/R1/System/$config.dat": b" " * (200 * controller.MOST_BYTES)}
+    )
+    assert bomb.stat().st_size < controller.MOST_BYTES
     assert "not a data list" in refusal(bomb)
 
 
 def test_too_many_files_are_refused_before_they_are_listed(tmp_path, monkeypatch):
-    monkeypatch.setattr(archive, "MOST_DIRECTORY_BYTES", 1000)
+    monkeypatch.setattr(controller, "MOST_DIRECTORY_BYTES", 1000)
     many = zipped(tmp_path / "many.zip", **{f"file_{k}.dat": "" for k in range(100)})
-    monkeypatch.setattr(archive.zipfile, "ZipFile", None)
+    monkeypatch.setattr(controller.zipfile, "ZipFile", None)
     assert "more than" in refusal(many)
 
 

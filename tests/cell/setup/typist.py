@@ -1,7 +1,7 @@
 """A person at the terminal: the keys that give answers to the questions of ``gcode2krl init``."""
 
 from gcode2krl.cell.setup.answers import completed
-from gcode2krl.cell.setup.controller import Controller
+from gcode2krl.cell.setup.controller import ArchivedController
 from gcode2krl.cell.setup.questions import (
     MACHINE_QUESTIONS,
     PLACE_QUESTIONS,
@@ -15,7 +15,7 @@ DOWN, ENTER, CLEAR = "\x1b[B", "\r", "\x15"
 
 def keys(given, controller=None):
     """Return the keys, question by question, that answer as ``given`` does."""
-    controller = controller or Controller(source="")
+    controller = controller or ArchivedController(source="")
     answers = completed(given, controller)
     typed = [_typed(question, answers, controller) for question in (*PLACE_QUESTIONS, *REFERENCE_QUESTIONS)]
     for count, tool in enumerate(answers["tools"]):

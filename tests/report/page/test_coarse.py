@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from gcode2krl.report.page.coarse import drawn_mesh
+from gcode2krl.report.page.content import drawn_mesh
 
 
 def test_a_mesh_with_few_triangles_stays_as_it_is():
