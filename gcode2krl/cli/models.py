@@ -70,7 +70,7 @@ def schema(what: str) -> None:
     """Print the JSON schema of a cell or project file, for editors, or that of what --json prints."""
     from gcode2krl.cell import cell_schema
     from gcode2krl.result.model import result_schema
-    from gcode2krl.translation.project import project_schema
+    from gcode2krl.translation.project_file import project_schema
 
     schemas = {"cell": cell_schema, "project": project_schema, "result": result_schema}
     click.echo(json.dumps(schemas[what](), indent=2))

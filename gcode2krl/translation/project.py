@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from typing import TYPE_CHECKING, Any
 
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
-from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.files.toml_guard import NotTomlError, read_bounded_toml
+
+if TYPE_CHECKING:  # pydantic costs a help text a noticeable start
+    from gcode2krl.translation.project_file import Options, ProjectFile
 
 NAME = "gcode2krl.toml"
 _PATHS = ("cell", "job", "search", "effects")
@@ -32,73 +32,6 @@ _DESTINATIONS = {
 }
 """Of keys whose option has another name in its command."""
 _KEYS = {destination: key for key, destination in _DESTINATIONS.items()}
-
-
-def _key(name: str) -> str:
-    return name.replace("_", "-")
-
-
-def _known(dialect: str) -> str:
-    if dialect not in DIALECT_NAMES:
-        raise ValueError(f"no dialect {dialect!r}; known: {', '.join(DIALECT_NAMES)}")
-    return dialect
-
-
-class _Options(BaseModel):
-    """Options of `translate`, `predict` and `batch`; a command takes those that it has."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, alias_generator=_key)
-
-    cell: str | None = Field(None, description="Cell file.")
-    job: str | None = Field(
-        None, description="What the CAM knows: its cutters and stock, laid over the cell."
-    )
-    dialect: Annotated[str, AfterValidator(_known)] | None = Field(
-        None,
-        description="What the post wrote the G-code for.",
-        json_schema_extra={"enum": list(DIALECT_NAMES)},
-    )
-    search: list[str] | None = Field(None, description="Folders with subprograms.")
-    block_delete: bool | None = Field(None, description="Skip lines that begin with /.")
-    chord_tolerance: float | None = Field(
-        None, gt=0.0, description="Largest error of the chords of an arc, mm."
-    )
-    tolerance: float | None = Field(None, gt=0.0, description="Blend corners within this, mm.")
-    simplify: float | None = Field(
-        None, gt=0.0, description="Merge feed moves into straight ones within this, mm."
-    )
-    allow: list[str] | None = Field(None, description="Findings to allow, CODE or CODE:LINE.")
-    strict: bool | None = Field(None, description="Warnings refuse a program too.")
-    no_guard: bool | None = Field(None, description="Leave out the checks at a program's start.")
-    split: Literal["defs", "files"] | None = Field(None, description="How a long program is split.")
-    max_lines: int | None = Field(None, ge=100, description="Motions in a part of a program.")
-    compensate: Literal["offline"] | None = Field(
-        None, description="Move the targets against the predicted deflection."
-    )
-    no_forces: bool | None = Field(None, description="Leave out material removal, forces and deflection.")
-    pilot: Literal["index", "values", "none"] | None = Field(
-        None, description="How a program carries the pilot force."
-    )
-    comment_every: int | None = Field(
-        None, ge=0, description="Motions between comments with the G-code line."
-    )
-    dt: float | None = Field(None, gt=0.0, description="Sample time of a prediction, s.")
-    csv: bool | None = Field(None, description="Write the tables of a prediction as CSV too.")
-    plot: bool | None = Field(None, description="Draw a prediction.")
-    effect: list[str] | None = Field(None, description="Effects of a prediction, NAME:key=value,...")
-    effects: list[str] | None = Field(None, description="Folders of effects of your own.")
-
-
-class _Files(_Options):
-    """Options of some parts of the folder."""
-
-    match: str = Field(description="Part of the folder, such as mill/*.nc; * goes through folders too.")
-
-
-class _ProjectFile(_Options):
-    """Options of gcode2krl for the parts in this folder and below."""
-
-    files: list[_Files] = Field([], description="Options of the parts that a pattern fits; the last counts.")
 
 
 @dataclass(frozen=True)
@@ -138,7 +71,7 @@ class Project:
     @property
     def keys(self) -> tuple[str, ...]:
         """The keys of the options in the file."""
-        return tuple(_KEYS.get(name, _key(name)) for name in self.options)
+        return tuple(_KEYS.get(name, name.replace("_", "-")) for name in self.options)
 
 
 def project_of(part: str | Path) -> Project:
@@ -161,15 +94,14 @@ def project_of(part: str | Path) -> Project:
     )
 
 
-def project_schema() -> dict[str, Any]:
-    """Return the JSON schema of a project file, for editors."""
-    return _ProjectFile.model_json_schema(by_alias=True) | {"title": "gcode2krl project file"}
-
-
 @lru_cache(maxsize=64)
-def _read(file: Path, _changed_ns: int) -> _ProjectFile:
+def _read(file: Path, _changed_ns: int) -> "ProjectFile":
+    from pydantic import ValidationError
+
+    from gcode2krl.translation.project_file import ProjectFile
+
     try:
-        return _ProjectFile.model_validate(read_bounded_toml(file))
+        return ProjectFile.model_validate(read_bounded_toml(file))
     except NotTomlError as error:
         raise input_error("not-toml", str(error), "correct the file", source=str(file)) from None
     except OSError as error:
@@ -182,17 +114,18 @@ def _read(file: Path, _changed_ns: int) -> _ProjectFile:
 
 def _issue(fault: Mapping[str, Any]) -> Issue:
     from gcode2krl.codes import closest
+    from gcode2krl.translation.project_file import Files, key_of
 
     place = ".".join(str(step) for step in fault["loc"])
     if fault["type"] != "extra_forbidden":
         return Issue("error", "project-key", 0, f"{place}: {fault['msg']}", "docs/project.md lists the keys")
-    known = list(map(_key, _Files.model_fields))
+    known = list(map(key_of, Files.model_fields))
     near = closest(str(fault["loc"][-1]), known)
     remedy = f"did you mean {near}?" if near else f"keys: {', '.join(known)}, files"
     return Issue("error", "project-key", 0, f"{place}: there is no such key", remedy)
 
 
-def _stated(options: _Options) -> dict[str, Any]:
+def _stated(options: "Options") -> dict[str, Any]:
     return options.model_dump(by_alias=True, exclude_none=True, exclude={"files", "match"})
 
 

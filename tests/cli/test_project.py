@@ -5,7 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from gcode2krl.translation.project import project_of, project_schema
+from gcode2krl.translation.project import project_of
+from gcode2krl.translation.project_file import project_schema
 from tests.cli.test_batch import CELL, GOOD, records
 
 PART = GOOD.format(x=50)
