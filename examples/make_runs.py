@@ -1,7 +1,7 @@
 """Makes the measured runs of examples/runs with the robot of the tests, which shares no code with gcode2krl.
 
-It drives the joints that the test piece's prediction commands, half an hour apart, with play in axis 3 and the
-usual differences of a robot, a process and a day.
+It drives the joints that the test piece's prediction commands, half an hour apart, with play in axis 3 and
+the usual differences of a robot, a process and a day.
 
     python examples/make_runs.py   with ``pip install -e ".[test]"``; a minute
 """
