@@ -19,7 +19,7 @@ def load_lines(loads: LoadFigures | None, cell: Cell) -> Iterator[str]:
     rated_N = GRAVITY_M_S2 * (cell.robot.payload.mass_kg or math.inf)
     if cell.stock is None and loads.force_N > NONSENSE_PAYLOADS * rated_N:
         yield (
-            f"  force      not known: the stock is guessed, and {loads.force_N:.0f} N says how deep that guess is; "
+            f"  force      not known: the stock is guessed, and {loads.force_N:.0f} N says how deep that is; "
             "state [stock] in the cell"
         )
         yield "  deflection not known"
