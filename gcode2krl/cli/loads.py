@@ -1,16 +1,28 @@
 """Words and figures on forces and deflection that several commands share."""
 
+import math
 from collections.abc import Iterator
 
 from gcode2krl.cell import Cell
 from gcode2krl.prediction.forecast import LoadFigures
-from gcode2krl.units import MM_PER_M
+from gcode2krl.units import GRAVITY_M_S2, MM_PER_M
+
+NONSENSE_PAYLOADS = 3.0
+"""A force of so many rated payloads comes from a guessed stock that is too deep, not from a cut."""
 
 
 def load_lines(loads: LoadFigures | None, cell: Cell) -> Iterator[str]:
     """Yield the lines on forces and deflection, with their 90 % bands."""
     if loads is None:
         yield "  force      not known"
+        return
+    rated_N = GRAVITY_M_S2 * (cell.robot.payload.mass_kg or math.inf)
+    if cell.stock is None and loads.force_N > NONSENSE_PAYLOADS * rated_N:
+        yield (
+            f"  force      not known: the stock is guessed, and {loads.force_N:.0f} N says how deep that is; "
+            "state [stock] in the cell"
+        )
+        yield "  deflection not known"
         return
     material = cell.material
     name = f", {material.model or material.name or 'own coefficients'}" if material is not None else ""

@@ -349,8 +349,8 @@ def _inputs(targets: Targets, cell: Cell) -> list[str]:
 def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell, split: str) -> list[Issue]:
     suffixes = (w.SIDECAR_SUFFIX, w.ETHERNET_SUFFIX, *w.SIGNAL_FLOW_SUFFIXES.values())
     program = (text for name, text in texts.items() if not name.endswith(suffixes))
-    size_mb = sum(map(len, program)) / BYTES_PER_MB
-    motions = int(np.count_nonzero(~targets.ptp))
+    sizes_mb = [len(text) / BYTES_PER_MB for text in program]
+    size_mb, motions = sum(sizes_mb), int(np.count_nonzero(~targets.ptp))
     if cell.controller.kss == "8.3" and size_mb > cell.program.warn_size_mb:
         sentence = (
             f"{size_mb:.1f} MB: KSS 8.3 holds about {cell.program.warn_size_mb:g} MB of all programs "
@@ -358,6 +358,8 @@ def _size_issues(texts: Mapping[str, bytes], targets: Targets, cell: Cell, split
         )
         remedy = "use a larger arc chord tolerance or --simplify, split the job, or state warn_size_mb"
         return [Issue("error", "program-memory", 0, sentence, remedy)]
+    if split == "files":  # each is loaded by itself
+        size_mb, motions = max(sizes_mb, default=0.0), min(motions, cell.program.max_lines)
     if size_mb <= cell.program.warn_size_mb and motions <= cell.program.memory_moves:
         return []
     return [

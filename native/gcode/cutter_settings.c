@@ -106,14 +106,14 @@ static void compare_with_tool(Block *b, double diameter_mm) {
         b->state->cutter_other_mm[0] = diameter_mm, b->state->cutter_other_mm[1] = in_cell_mm;
 }
 
-/* Warn of the other diameter where a block moves in the plane of compensation. */
+/* Warn of the other diameter where a block cuts in the plane of compensation. */
 void tell_other_diameter(Block *b) {
     State *s = b->state;
     const double *other_mm = s->cutter_other_mm;
     const bool across = s->plane == V_PLANE_XY ? b->has[V_WORD_X] || b->has[V_WORD_Y]
                                                : b->has[V_WORD_X] || b->has[V_WORD_Z];
     const bool centre = b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K];
-    if (other_mm[0] == other_mm[1] || !(across || centre))
+    if (other_mm[0] == other_mm[1] || !(across || centre) || s->motion == V_MOTION_RAPID)
         return;
     report_at(b, s->cutter_line, F_CUTTER_DIFFERS,
               (Says){.a = s->cutter_code, .b = other_mm[0], .c = other_mm[1]});

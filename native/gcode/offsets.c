@@ -235,7 +235,7 @@ static void g10(Block *b) {
         set_offset(b, l, p);
         return;
     } else if (l == V_L_TOOL || l == V_L_TOOL_FROM_POSITION || l == V_L_TOOL_FROM_FIXTURE) {
-        b->used[V_WORD_R] = true;
+        b->used[V_WORD_R] = b->used[V_WORD_Q] = b->used[V_WORD_I] = b->used[V_WORD_J] = true; /* of a lathe's tools */
         set_tool(b, l, b->has[V_WORD_P] ? p : NOT_WHOLE);
         return;
     } else {

@@ -6,6 +6,7 @@
 #include "gcode/parameters.h"
 
 #include "gcode/block.h"
+#include "gcode/cutter_settings.h"
 #include "gcode/offsets.h"
 
 /* --- numbered ------------------------------------------------------------------------------------------- */
@@ -47,6 +48,12 @@ static double of_work_offset(const Machine *machine, int64_t number) {
     return system < SYSTEMS && column <= 3 && (axis < 3 || column != axis) ? CELL(machine->offsets, system, column) : 0.0;
 }
 
+/* Return the diameter of the tool that the program has changed to, in mm; NaN where it is not declared, or in inches. */
+static double diameter_in_spindle(const Machine *machine) {
+    const State *s = machine->state.at;
+    return s->tool_stated && s->unit_mm == 1.0 ? diameter_of(machine, s->tool) : NAN;
+}
+
 /* Return one of #5161 to #5428, which show the state of the machine. */
 static double of_state(const Machine *machine, int64_t number) {
     const State *s = machine->state.at;
@@ -64,6 +71,8 @@ static double of_state(const Machine *machine, int64_t number) {
         return of_work_offset(machine, number);
     if (number == TOOL)
         return s->tool;
+    if (number == TOOL_DIAMETER)
+        return diameter_in_spindle(machine);
     if (number >= POSITION && number < POSITION + 3)
         return programmed(machine, (int)(number - POSITION));
     return 0.0;
@@ -80,7 +89,7 @@ static bool is_beside(const Machine *machine) { return machine->state.at->cutter
 
 /* Tell whether a numbered parameter shows what is not known: the diameter, or a place under compensation. */
 bool is_of_cutter(const Machine *machine, int64_t number) {
-    return number == TOOL_DIAMETER || (number >= POSITION && number <= LAST_OF_STATE && is_beside(machine));
+    return (number == TOOL_DIAMETER && isnan(diameter_in_spindle(machine))) || (number >= POSITION && number <= LAST_OF_STATE && is_beside(machine));
 }
 
 bool is_name_of_cutter(const Machine *machine, int64_t name) {
@@ -118,7 +127,7 @@ int fault_of_number(const Machine *machine, int64_t number) {
         return PF_OF_OTHER_AXIS;
     if ((number == POSITION || number == POSITION + 1) && is_turned(machine->state.at))
         return PF_TURNED_UNDER_SHIFT;
-    if (number >= TOOL_OFFSET && number <= LAST_OF_TOOL)
+    if (number >= TOOL_OFFSET && number <= LAST_OF_TOOL && number != TOOL_DIAMETER)
         return PF_OF_TOOL_TABLE;
     return machine->state.at->unit_mm != 1.0 && is_in_machine_unit(number) ? PF_IN_MACHINE_UNIT : KNOWN;
 }

@@ -116,7 +116,7 @@ TAIL = "G1 X20\nG40\nG1 X40\nM2\n"
         (ON + "G81 X20 Z-5 R2\n" + TAIL, "cutter-on", 5),
         (ON + "G1 X15 Z#5421\n" + TAIL, "cutter-parameter", 5),
         (ON + "#<a> = #<_x>\n" + TAIL, "cutter-parameter", 5),
-        (HEAD + "G41.1 D#5410\n" + TAIL, "cutter-parameter", 3),
+        (HEAD + "G20\nG41.1 D#5410\n" + TAIL, "cutter-parameter", 4),
         (HEAD + "G10 L2 P1 R30\nG41.1 D2\n" + TAIL, "cutter-frame", 4),
     ],
 )
@@ -182,3 +182,22 @@ def test_another_diameter_is_told_where_something_is_cut_with_it(move, told):
     text = f"G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41.1 D10\n{move}\nG40\nG1 X90 F500\nM2\n"
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", load_cell())
     assert [i.line for i in toolpath.issues if i.code == "cutter-differs"] == ([5] if told else [])
+
+
+def test_the_diameter_of_the_tool_in_the_spindle_is_a_parameter_in_mm():
+    """LinuxCNC's #5410; tool 1 of the demonstration cell has 16 mm."""
+    text = "G21 G90 G17\nT1 M6\nG43 H1\nS900 M3\nG0 X0 Y0 Z0\nF100\nG41.1 D#5410\nG1 X20\nG40\nM2\n"
+    toolpath = read_stream(io.BytesIO(text.encode()), "part.ngc", load_cell())
+    assert toolpath.position_mm[-1].tolist() == [20, 8, 0]
+    assert "cutter-differs" not in {issue.code for issue in toolpath.issues}
+
+
+def test_another_diameter_is_told_where_it_cuts():
+    head = "G21 G90 G17\nT1 M6\nG43 H1\nS900 M3\nG0 X0 Y0 Z5\nF100\nG41.1 D12\n"
+
+    def codes(lines):
+        toolpath = read_stream(io.BytesIO(f"{head}{lines}\nM2\n".encode()), "part.ngc", load_cell())
+        return {issue.code for issue in toolpath.issues}
+
+    assert "cutter-differs" not in codes("G0 X20\nG40")
+    assert "cutter-differs" in codes("G0 X20\nG1 Y20\nG40")
