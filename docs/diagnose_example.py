@@ -1,4 +1,4 @@
-"""The diagnosis of examples/runs: three measured runs of the test piece, by a robot with play in axis 3.
+"""The diagnosis of examples/runs: three dry runs of the test piece, by a robot with play in axis 3.
 
 python docs/diagnose_example.py              prints the report that the README shows; less than a minute
 python docs/diagnose_example.py --keep DIR   leaves prediction, page and pictures in a folder
@@ -18,7 +18,7 @@ IMAGE = ROOT / "docs" / "images" / "gap_backlash.png"
 
 def report(folder: Path) -> str:
     """Return the text of the diagnosis; ``gap.html`` and ``pictures/`` are left in the folder."""
-    _done("predict", "examples/test_piece.nc", "-o", str(folder / "p"))
+    _done("predict", "examples/test_piece.nc", "-o", str(folder / "p"), "--no-forces")
     runs = sorted(str(each) for each in (ROOT / "examples" / "runs").glob("run-*"))
     outputs = ["--html", str(folder / "gap.html"), "--plot", str(folder / "pictures")]
     return _done("diagnose", str(folder / "p"), *runs, *outputs)

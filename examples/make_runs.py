@@ -1,7 +1,7 @@
 """Makes the measured runs of examples/runs with the robot of the tests, which shares no code with gcode2krl.
 
-It drives the joints that the test piece's prediction commands, half an hour apart, with play in axis 3 and
-the usual differences of a robot, a process and a day.
+They are dry runs: the joints that the test piece's prediction commands, in air, half an hour apart, with play
+in axis 3 and the usual differences of a robot and a day; a controller's log and a tracker, no force sensor.
 
     python examples/make_runs.py   with ``pip install -e ".[test]"``; a minute
 """
@@ -17,9 +17,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from gcode2krl import predict  # noqa: E402
-from gcode2krl.cutting.guess import guessed_box  # noqa: E402
 from tests.plant import faults, folders, mismatch  # noqa: E402
-from tests.plant.instruments import Instruments  # noqa: E402
+from tests.plant.instruments import Instruments, without  # noqa: E402
 from tests.plant.plans import Day  # noqa: E402
 from tests.plant.programs import Track  # noqa: E402
 from tests.plant.robot import simulate  # noqa: E402
@@ -33,24 +32,21 @@ SLOW_s = 0.048
 
 def main() -> None:
     """Write run-1, run-2 and run-3."""
-    prediction = predict(ROOT / PROGRAM)
+    prediction = predict(ROOT / PROGRAM, forces=False)
     track = Track(prediction.motion.time_s, prediction.joints.q_rad)
     rng = np.random.default_rng(SEED)
-    cutter = prediction.cell.tool[1]
-    box = guessed_box(prediction.toolpath, np.eye(3), cutter.diameter_mm / 2.0)
-    world = World(stock_mm=np.asarray(box))
+    far_below = np.array([[0.0, -70.0, -1030.0], [160.0, 70.0, -1000.0]])
+    world = World(stock_mm=far_below)
     robot = mismatch.of_robot(rng, mismatch.USUAL)
     play = faults.build(FAULT, "same", SEED).hooks(GAP_DEG)
     how = Instruments(
         tracker_hz=1.0 / SLOW_s,
-        force_hz=1.0 / SLOW_s,
         controller_s=SLOW_s,
         q_load=False,
-        force_moments=False,
         q_decimals=4,
         tracker_decimals=3,
-        force_decimals=1,
     )
+    how = without(how, ("force",))
     begin = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
     for number in range(3):
         age_s = 1800.0 * number
