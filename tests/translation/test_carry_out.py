@@ -32,8 +32,12 @@ def record_in_a_worker(order):
 
 def test_the_command_without_options_is_an_order_without_options():
     given = command.make_context("translate", ["part.nc"]).params
-    options = {name: value for name, value in given.items() if name not in ("as_json", "quiet", "verbose")}
-    assert set(options) == {field.name for field in fields(Order)}
+    options = {
+        name: value
+        for name, value in given.items()
+        if name not in ("as_json", "quiet", "verbose", "isolated")
+    }
+    assert set(options) | {"project"} == {field.name for field in fields(Order)}
     assert Order(**options) == Order("part.nc")
     assert Order(**options).options() == {}
 

@@ -6,10 +6,9 @@ from gcode2krl.gap.beside.arm_geometry import ArmGeometry
 from gcode2krl.gap.beside.links import MECHANICS
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap
+from gcode2krl.gap.thresholds import THRESHOLDS
 
 GEOMETRY = "geometry"
-_PROBABILITY = 0.95
-"""Held-out error falls by more than a fifth: our choice, no calibration has such cases."""
 
 
 def with_geometry(gap: Gap, rest: Gap, found: ArmGeometry) -> Gap:
@@ -26,7 +25,7 @@ def with_geometry(gap: Gap, rest: Gap, found: ArmGeometry) -> Gap:
         effect=GEOMETRY,
         target=None,
         link=MECHANICS.name,
-        probability=_PROBABILITY,
+        probability=THRESHOLDS.tell.geometry_probability,
         parameters=parts,
         shrink=shrink,
         rms_after=found.after_mm,

@@ -35,6 +35,11 @@ class TellThresholds:
     phase_named_share: float = convention(
         0.5, "a phase with less of the gap's power is not in the first sentence"
     )
+    geometry_probability: float = convention(
+        0.95,
+        "of the arm's own geometry, where it takes a fifth and more of the error at places left out of its fit: "
+        "no calibration has such cases",
+    )
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
     worst_run: float = convention(
         1.25, "a run whose gap is this many times that of all runs is named; nearer sizes are told as one"
