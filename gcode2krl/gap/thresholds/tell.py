@@ -37,8 +37,8 @@ class TellThresholds:
     )
     geometry_probability: float = convention(
         0.95,
-        "of the arm's own geometry, where it takes a fifth and more of the error at places left out of its fit: "
-        "no calibration has such cases",
+        "of the arm's own geometry, where it takes a fifth and more of the error at places left out of its "
+        "fit: no calibration has such cases",
     )
     report_lines: int = convention(8, "intervals, and causes, that the report prints")
     worst_run: float = convention(
