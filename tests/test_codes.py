@@ -18,6 +18,11 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
+    "v-bit",
+    "shape-type",
+    "tip-diameter",
+    "post-process",
+    "lower-diameter",
     "bull-nose",
     "head-head",
     "table-head",

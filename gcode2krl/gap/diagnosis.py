@@ -8,7 +8,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.gap.beside.arm_geometry import arm_geometry
+from gcode2krl.gap.beside.arm_geometry import geometry_of_arm
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
@@ -24,7 +24,7 @@ from gcode2krl.gap.choose.surface import judge_surface
 from gcode2krl.gap.slips.order import examine_set_up
 from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.geometry_cause import with_geometry
-from gcode2krl.gap.tell.lateness import lateness, with_lateness
+from gcode2krl.gap.tell.lateness import late_by, with_lateness
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
@@ -104,13 +104,15 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 
 
 def _diagnosed(context: Context, begin: Begin) -> Gap:
-    """Return the answer; of poses that the arm's own geometry explains, also what is at work beside it."""
+    """Return the answer; of poses that many errors of the arm explain, also what is beside these."""
     gap = _answered(context, begin)
     if any(cause.words is not None for cause in gap.named_causes):
         return gap
-    links = (link for link in gap.links if link.link == MECHANICS.name and link.rms_before > 0.0)
-    left = next((link.rms_after / link.rms_before for link in links), 1.0)
-    found = arm_geometry(context.pairs, context.explaining, left)
+    tip = next((link for link in gap.links if link.link == MECHANICS.name), None)
+    if tip is not None and tip.verdict == "explained":  # one error alone keeps its own name
+        return gap
+    left = tip.rms_after / tip.rms_before if tip is not None and tip.rms_before > 0.0 else 1.0
+    found = geometry_of_arm(context.pairs, context.explaining, left)
     if found is None:
         return gap
     return with_geometry(gap, _answered(context.with_pairs(found.pairs), begin), found)
@@ -127,7 +129,7 @@ def _answered(context: Context, begin: Begin) -> Gap:
     on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
     issues = [*issues, *_of_actual_joints(context, on_time)]
     late = [
-        lateness(planned, timed)
+        late_by(planned, timed)
         for planned, timed in zip(context.pairs, on_time.pairs, strict=True)
         if planned.has_actual_joints_alone
     ]
@@ -157,7 +159,7 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
         return []
     late = []
     for pair, timed in pairs:
-        largest_s = lateness(pair, timed).largest_s
+        largest_s = late_by(pair, timed).largest_s
         if largest_s > 0.0:
             words = (
                 f"{pair.name}: by up to {largest_s:.3g} s off the planned times, and compared place by place"

@@ -1,5 +1,6 @@
 """Every help text ends with examples, and each example runs as it stands."""
 
+import json
 import os
 import shlex
 import shutil
@@ -67,6 +68,12 @@ def ready(folder, run):  # noqa: F811
         if "batch" in line:
             (folder / "parts").mkdir()
             shutil.copy(folder / "part.nc", folder / "parts")
+        if "tools import" in line:
+            geometry = {"DC": 10, "NOF": 3, "LCF": 22}
+            tool = {"type": "flat end mill", "unit": "millimeters", "geometry": geometry}
+            library = {"data": [tool | {"post-process": {"number": 5}}]}
+            (folder / "library.json").write_text(json.dumps(library), encoding="utf-8")
+            (folder / "tool.tbl").write_text("T1 P1 D6 ; end mill\n", encoding="utf-8")
         if "macros/" in line:
             (folder / "macros").mkdir()
         (folder / ".local" / "share" / "FreeCAD" / "Macro").mkdir(parents=True, exist_ok=True)

@@ -38,7 +38,7 @@ class ArmGeometry:
     """The runs with the errors taken off their measured tips: what else is at work is left in them."""
 
 
-def arm_geometry(pairs: Sequence[Pair], explaining: int, left: float) -> ArmGeometry | None:
+def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmGeometry | None:
     """Return the geometry of the arm that explains runs of poses; None where it brings less than a fifth.
 
     ``left``: share of the gap's rms that causes which were found already leave. None too where a frame and a

@@ -26,7 +26,7 @@ class Late:
         return self.largest_s > 2.0 * self.stamp_s
 
 
-def lateness(planned: Pair, on_time: Pair) -> Late:
+def late_by(planned: Pair, on_time: Pair) -> Late:
     """Return the lateness of a run of which two pairs are given: on the planned times, and on its own."""
     moved_s = on_time.inputs.time_s - planned.inputs.time_s
     table = planned.run.controller

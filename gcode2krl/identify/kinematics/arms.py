@@ -43,7 +43,7 @@ class Arm:
 
 
 @cache
-def arms() -> dict[str, Arm]:
+def _listed() -> dict[str, Arm]:
     """Return model → arm of other makers, from ``arms.toml``."""
     text = files("gcode2krl.identify.kinematics").joinpath("arms.toml").read_text(encoding="utf-8")
     return {
@@ -84,7 +84,7 @@ def arm_named(model: str) -> Arm:
 
 def all_arms() -> dict[str, Arm]:
     """Return model → arm of every maker."""
-    found = dict(arms())
+    found = dict(_listed())
     for model in library.names("robots"):
         geometry = library.read_model("robots", model).get("geometry", {})
         if "a1_mm" in geometry:
