@@ -13,7 +13,6 @@ processor has, and both give the same bits, as no operation is contracted or reo
 """
 
 import argparse
-import hashlib
 import importlib.util
 import os
 import platform
@@ -72,14 +71,6 @@ class Machine:
         return cls(system, processor == "x86_64" and system != "macos", ("-target", target + oldest))
 
 
-def sources_digest(folder: Path = HERE) -> str:
-    """Return a digest of all that the core is made from; `gcode2krl.compiled.core` compares it."""
-    digest = hashlib.sha256()
-    for path in sorted([*folder.rglob("*.c"), *folder.rglob("*.h")]):
-        digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
-    return digest.hexdigest()[:16]
-
-
 def compiler() -> list[str] | None:
     """Return the command of a C compiler, or None if there is none.
 
@@ -126,10 +117,17 @@ def build(
     if command is None:
         raise SystemExit("no C compiler: install one, or the package ziglang, which brings one")
     machine = machine or Machine.this()
-    _run([sys.executable, str(HERE / "constants.py")])
+    digest = _run(
+        [sys.executable, str(HERE / "constants.py")]
+    ).strip()  # by it the loader knows an older core
     into.mkdir(parents=True, exist_ok=True)
     return [
-        _library(command, machine, flags, into / f"{name}{SUFFIXES[machine.system]}")
+        _library(
+            command,
+            machine,
+            (*flags, f'-DCORE_SOURCES="{digest}"'),
+            into / f"{name}{SUFFIXES[machine.system]}",
+        )
         for name, flags in _variants(machine, checked=checked, by_zig="ziglang" in command)
     ]
 
@@ -150,8 +148,7 @@ def _library(command: list[str], machine: Machine, flags: Iterable[str], target:
         files = sorted(HERE.rglob("*.c"))
         objects = [Path(folder) / f"{number}.o" for number in range(len(files))]
         position = () if machine.system == "windows" else ("-fPIC",)
-        digest = f'-DCORE_SOURCES="{sources_digest()}"'
-        common = [*command, *machine.flags, *FLAGS, *flags, *position, digest, f"-I{HERE}", "-c"]
+        common = [*command, *machine.flags, *FLAGS, *flags, *position, f"-I{HERE}", "-c"]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             pairs = zip(files, objects, strict=True)
             list(pool.map(lambda pair: _run([*common, str(pair[0]), "-o", str(pair[1])]), pairs))
@@ -165,12 +162,14 @@ def _library(command: list[str], machine: Machine, flags: Iterable[str], target:
     return target
 
 
-def _run(command: list[str]) -> None:
+def _run(command: list[str]) -> str:
+    """Return what a command prints; raises SystemExit with what it says where it fails."""
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"{shlex.join(command)}\n{done.stderr}")
     if done.stderr:
         print(done.stderr, file=sys.stderr)
+    return done.stdout
 
 
 def wheel_platform() -> str:

@@ -1,6 +1,7 @@
 """Write native/constants.h: what the Python modules and the core must agree about, from the Python modules.
 
-`native/build.py` runs it before it compiles; the file is not kept. Needs numpy, pydantic and jinja2, as the
+`native/build.py` runs it before it compiles, and compiles in the digest of all sources that it prints; the
+header is not kept. Needs numpy, pydantic and jinja2, as the
 modules do.
 
 A number ``NAME`` of a module becomes ``PREFIX_NAME``, a word ``PREFIX_NAME`` in quotes, a tuple of numbers
@@ -184,3 +185,4 @@ def _at(place: tuple[str, str]) -> Any:
 if __name__ == "__main__":
     core.core_function = lambda *_, **__: None  # what is asked here comes before the core that has it
     HEADER.write_text(header(), encoding="ascii", newline="\n")
+    print(core.sources_digest())

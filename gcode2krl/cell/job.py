@@ -20,7 +20,8 @@ from gcode2krl.cell.sections.fields import Finite, NotNegative, Positive
 from gcode2krl.errors import Issue, NotUnderstoodError
 
 _Model = TypeVar("_Model", bound=Section)
-_SHAPE = ("kind", "diameter_mm", "corner_radius_mm", "taper_deg", "point_deg")
+SHAPE = ("kind", "diameter_mm", "corner_radius_mm", "taper_deg", "point_deg")
+"""Keys that make a cutter what it is."""
 _OF_THE_CELL = [
     "teeth",
     "helix_deg",
@@ -137,7 +138,7 @@ def _tool_with(own: Tool, cutter: JobTool, number: int, source: str) -> Tool:
     given = cutter.model_dump(exclude_none=True, exclude={"overall_length_mm"})
     if cutter.kind == "ball":
         given["corner_radius_mm"] = 0.0
-    if any(_differs(stated.get(key), given.get(key)) for key in _SHAPE):
+    if any(differs(stated.get(key), given.get(key)) for key in SHAPE):
         stated = {key: value for key, value in stated.items() if key in _OF_THE_CELL}
         stated["model"] = f"{cutter.kind} {cutter.diameter_mm:g} of the job"
     if own.stick_out_mm is None and own.length_mm is not None and cutter.overall_length_mm is not None:
@@ -146,7 +147,8 @@ def _tool_with(own: Tool, cutter: JobTool, number: int, source: str) -> Tool:
     return _checked(Tool, stated | given, f"tool.{number}.", source)
 
 
-def _differs(own: Any, given: Any) -> bool:
+def differs(own: Any, given: Any) -> bool:
+    """Tell whether two values of a key of a tool are not the same but for rounding."""
     if isinstance(own, float) and isinstance(given, float):
         return abs(own - given) > _SLACK_MM
     return bool(own != given)

@@ -169,8 +169,8 @@ def _freecad_bit(file: Path, _unit: str, number: int | None = None) -> Iterator[
         1.0,
         {
             "diameter_mm": length["Diameter"],
-            "teeth": flutes or (2 if is_drill else None),
-            "corner_radius_mm": _length_mm(stated.get("TorusRadius") or stated.get("FlatRadius")),
+            "teeth": flutes,
+            "corner_radius_mm": _length_mm(stated.get("CornerRadius")),  # FlatRadius is that of the flat end
             "flute_length_mm": length["CuttingEdgeHeight"],
             "shank_diameter_mm": length["ShankDiameter"],
             "point_deg": angle if is_drill else None,
@@ -207,7 +207,8 @@ def _linuxcnc(file: Path, unit: str) -> Iterator[FileTool]:
         scale = _asked(unit, file)
         flutes = re.search(r"(\d+)\s*-?\s*(?:FL\b|FLUTE)", comment, re.IGNORECASE)
         values = {"diameter_mm": stated.get("D"), "teeth": flutes and float(flutes[1])}
-        yield _tool(int(stated["T"]), comment.strip() or "tool", comment or "flat", scale, values)
+        named = next((word for word in _KINDS if word in comment.lower()), "")
+        yield _tool(int(stated["T"]), comment.strip() or "tool", named and comment, scale, values)
 
 
 _HEADER = re.compile(
@@ -253,19 +254,23 @@ _READERS: Mapping[str, Callable[[Path, str], Iterator[FileTool]]] = {
 
 
 def _tool(number: Any, name: str, type_name: str, scale: float, stated: Mapping[str, Any]) -> FileTool:
-    """Return a tool with the keys of a cell; ``scale`` are mm of its unit, angles are degrees."""
+    """Return a tool with the keys of a cell; ``scale`` are mm of its unit, angles are degrees.
+
+    Without a type's name the tool has no ``kind``.
+    """
     nr = int(number) if str(number or "").strip().isdigit() and int(number) > 0 else None
     words = type_name.lower()
     kind = next((kind for word, kind in _KINDS.items() if word in words), None)
-    if kind is None or _NOT_OF_A_CELL.search(words):
-        return FileTool(nr, name, unread=f"a cell has no {type_name.strip() or 'tool without a type'}")
+    if (kind is None and words) or _NOT_OF_A_CELL.search(words):
+        return FileTool(nr, name, unread=f"a cell has no {type_name.strip()}")
     keys: dict[str, Any] = {
         key: round(float(value) * (scale if key.endswith("_mm") else 1.0), 6)
         for key, value in stated.items()
         if value not in (None, "") and float(value) > 0.0
     }
     tip_mm = keys.pop("tip_mm", None)
-    keys["kind"] = kind
+    if kind is not None:
+        keys["kind"] = kind
     if "teeth" in keys:
         keys["teeth"] = int(keys["teeth"])
     if kind == "tapered":

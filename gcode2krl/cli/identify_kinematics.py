@@ -10,7 +10,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_other
+from gcode2krl.cli.inputs import cell_files, common_options, named_values, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
 
 if TYPE_CHECKING:
@@ -91,7 +91,9 @@ def command(
             if given is not None:
                 require_other(Path(given), poses, *cell_files(cell_path))
         arm, options = _asked(cell_path, robot, noise_mm, without, no_order, masses, gravity)
-        readings = read_readings(poses, columns=_pairs(columns, "--columns"), units=_pairs(unit, "--unit"))
+        readings = read_readings(
+            poses, columns=named_values(columns, "--columns"), units=named_values(unit, "--unit")
+        )
         with console.stage("fitting"):
             result = identify_kinematics(readings, arm, options)
         files, held = [], ""
@@ -142,16 +144,6 @@ def _asked(
         lumps = (links[1], links[2] + links[3], links[4] + links[5] + (cell.load.mass_kg or 0.0))
     groups = tuple(group for group in fitted if group not in without)
     return arm, Options(groups, noise_mm, not no_order, gravity, lumps)
-
-
-def _pairs(words: Sequence[str], option: str) -> dict[str, str]:
-    pairs = {}
-    for word in words:
-        name, equals, value = word.rpartition("=")
-        if not equals or not name:
-            raise input_error("option-value", f"{option} {word!r}: no NAME=VALUE", f"{option} NAME=VALUE")
-        pairs[name] = value
-    return pairs
 
 
 # --- words ----------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import click
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.record_head import heading
 from gcode2krl.compiled.threads import THREADS_VARIABLE
+from gcode2krl.errors import input_error
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.translation import inputs as reading
 from gcode2krl.translation.inputs import (
@@ -44,6 +45,7 @@ __all__ = [
     "gcode_options",
     "isolated_option",
     "job_option",
+    "named_values",
     "options_of_project",
     "read_cell",
     "read_cell_under_job",
@@ -187,6 +189,17 @@ def options_of_project(function: Any) -> Any:
         return function(part=part, **(options | dict(project.options)), project=project)
 
     return command
+
+
+def named_values(words: Sequence[str], option: str) -> dict[str, str]:
+    """Return the NAME=VALUE words of an option as a mapping; a name may hold an = itself."""
+    pairs = {}
+    for word in words:
+        name, equals, value = word.rpartition("=")
+        if not equals or not name:
+            raise input_error("option-value", f"{option} {word!r}: no NAME=VALUE", f"{option} NAME=VALUE")
+        pairs[name] = value
+    return pairs
 
 
 def read_cell(path: str | None) -> "Cell":

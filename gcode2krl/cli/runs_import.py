@@ -10,7 +10,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import common_options
+from gcode2krl.cli.inputs import common_options, named_values
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
 if TYPE_CHECKING:
@@ -111,23 +111,12 @@ def _guess(
     return guess_of(
         table,
         like=layout,
-        columns=_pairs(columns, "--columns"),
-        units=_pairs(units, "--unit"),
+        columns=named_values(columns, "--columns"),
+        units=named_values(units, "--unit"),
         order=order,
         joints=joints,
         prediction=Prediction.load(prediction) if prediction is not None else None,
     )
-
-
-def _pairs(words: Sequence[str], option: str) -> dict[str, str]:
-    """Return NAME=VALUE words as a mapping; a name may hold an = itself."""
-    pairs = {}
-    for word in words:
-        name, equals, value = word.rpartition("=")
-        if not equals or not name:
-            raise input_error("option-value", f"{option} {word!r}: no NAME=VALUE", f"{option} NAME=VALUE")
-        pairs[name] = value
-    return pairs
 
 
 def shown(guess: "Guess") -> list[str]:

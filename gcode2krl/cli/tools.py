@@ -12,8 +12,8 @@ from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 
-_SLACK_MM = 0.01
-_SHAPE = ("kind", "diameter_mm", "corner_radius_mm", "taper_deg", "point_deg")
+_NEEDED = {"kind": "flat", "teeth": "2", "corner_radius_mm": "0.5"}
+"""Keys without which a section would say something that the file does not, with examples."""
 
 
 @click.group("tools", epilog=examples("gcode2krl tools import library.json --cell cell.toml"))
@@ -131,10 +131,12 @@ def _sections(
             left_out(tool, "it has no number", "number it in the library")
         elif number in sections:
             left_out(tool, "the number is taken by an earlier tool", "number it otherwise in the library")
-        elif "teeth" not in keys:
-            left_out(tool, "how many teeth it has is not stated", f"--set {number}.teeth=2")
+        elif lacking := [key for key in _NEEDED if key not in keys and key in _needed(keys)]:
+            words = " ".join(f"--set {number}.{key}={_NEEDED[key]}" for key in lacking)
+            left_out(tool, f"{' and '.join(lacking)} not stated", words)
         else:
-            sections[number] = keys | {"source": f"{tool.name}, from {source}", "sure": "checked"}
+            # what a CAM system keeps was never measured on this spindle
+            sections[number] = keys | {"source": f"{tool.name}, from {source}", "sure": "assumption"}
             if "length_mm" not in keys:
                 sentence = f"T{number} {tool.name}: no length from the spindle's gauge line to the tip"
                 issues.append(
@@ -143,16 +145,21 @@ def _sections(
     return sections, issues
 
 
+def _needed(keys: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(_NEEDED) if keys.get("kind") == "bull-nose" else ("kind", "teeth")
+
+
 def _in_cell(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> tuple[dict[int, Any], list[Issue]]:
     """Return the cell's own tools of these numbers, and a finding where theirs is another cutter."""
     from gcode2krl.cell import load_cell
+    from gcode2krl.cell.job import SHAPE, differs
 
     own = load_cell(cell_path).tool
     there = {number: own[number] for number in sections if number in own}
     issues = []
     for number, tool in there.items():
         keys = sections[number]
-        wrong = [key for key in _SHAPE if key in keys and _differs(keys[key], getattr(tool, key))]
+        wrong = [key for key in SHAPE if key in keys and differs(getattr(tool, key), keys[key])]
         if wrong:
             words = ", ".join(f"{key} {keys[key]} and {getattr(tool, key)} in the cell" for key in wrong)
             remedy = f"correct [tool.{number}] of the cell, or renumber the tool in the CAM system"
@@ -160,12 +167,6 @@ def _in_cell(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> tuple
                 Issue("warning", "tool-differs", 0, f"T{number}: {words}; the cell's stays", remedy)
             )
     return there, issues
-
-
-def _differs(one: Any, other: Any) -> bool:
-    if isinstance(one, float) and isinstance(other, (int, float)):
-        return abs(one - other) > _SLACK_MM
-    return bool(one != other)
 
 
 def _added(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> list[Path]:

@@ -173,7 +173,7 @@ def _refuse_other_sources(core: ctypes.CDLL) -> None:
     """In a source tree compare what the core was built from with what is there."""
     if not (_NATIVE / "core.h").exists():
         return
-    if _built_from(core) != _digest():
+    if _built_from(core) != sources_digest():
         raise _wrong_installation("the compiled core is older than its sources")
 
 
@@ -187,14 +187,33 @@ def _built_from(core: ctypes.CDLL) -> str:
     return str(core.core_sources().decode())
 
 
-def _digest() -> str:
-    """Return the digest of the sources, as `native/build.py` writes it into the core."""
+def sources_digest() -> str:
+    """Return the digest of the sources in a source tree, as `native/build.py` writes it into the core.
+
+    A number of a Python module is compiled in: a core of another one would read a program otherwise.
+    """
     import hashlib
 
     digest = hashlib.sha256()
-    for path in sorted([*_NATIVE.rglob("*.c"), *_NATIVE.rglob("*.h")]):
+    for path in _sources():
         digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()[:16]
+
+
+def _sources() -> list[Path]:
+    """Return the C files, and the modules and the table of which `native/constants.py` makes their header."""
+    import re
+
+    maker = _NATIVE / "constants.py"
+    named = set(re.findall(r'"(gcode2krl(?:\.\w+)+)"', maker.read_text(encoding="utf-8")))
+    modules = (_NATIVE.parent / f"{name.replace('.', '/')}.py" for name in named)
+    files = (
+        *_NATIVE.rglob("*.c"),
+        *_NATIVE.rglob("*.h"),
+        *modules,
+        *_NATIVE.parent.glob("gcode2krl/gcode/*.toml"),
+    )
+    return sorted([maker, *(file for file in files if file.name != "constants.h")])
 
 
 def _wrong_installation(message: str) -> InstallationError:

@@ -8,7 +8,6 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
-from gcode2krl.gap.beside.arm_geometry import geometry_of_arm
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
@@ -18,6 +17,7 @@ from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TI
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.beside.retiming import on_own_timing
+from gcode2krl.gap.choose.arm_geometry import geometry_of_arm
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.choose.surface import judge_surface

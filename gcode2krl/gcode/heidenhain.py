@@ -21,6 +21,8 @@ from typing import Final
 from gcode2krl.gcode import dialects as r
 
 _NUMBER = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
+_FIRST_OFFSETS = 4
+"""G54 to G57; a Sinumerik's further ones are G505 to G599."""
 _VALUE = rf"(?:{_NUMBER}|[+-]?Q\d+)"
 _TOKEN = re.compile(
     rf"(?P<inc>I?)(?P<axis>[XYZABC]|PR|PA) *(?P<value>{_VALUE})|(?P<side>R[0LR])\b"
@@ -98,7 +100,7 @@ class Translator:
         self._feed, self._speed = "", ""
         self._shift = {"X": "0", "Y": "0", "Z": "0"}
         self._labels: dict[str, str] = {}
-        self._ends, self._shortest, self._datum = 0, False, ""
+        self._ends, self._shortest = 0, False
         self._kinds_of_holes = len(set(re.findall(r"CYCL DEF (20[0137])\b", text)))
         self._labels_at: dict[str, list[int]] = {}
         for k, line in enumerate(self._lines):
@@ -191,11 +193,12 @@ class Translator:
         return "TRANS " + " ".join(f"{axis}={value}" for axis, value in self._shift.items())
 
     def _datum_preset(self, code: str) -> str:
-        number = dict(_Q_WORD.findall(code)).get("339", "")
-        if self._datum and number != self._datum:
+        """Return the n-th settable offset for preset n: the cell states where it lies, or it is reported."""
+        number = re.fullmatch(r"\+?0*([1-9]\d?)", dict(_Q_WORD.findall(code)).get("339", ""))
+        if number is None or any(value != "0" for value in self._shift.values()):  # a preset ends a shift
             raise _RefusedError(r.REASON_SHIFT)
-        self._datum = number
-        return "NOTED"
+        n = int(number[1])
+        return f"G{53 + n}" if n <= _FIRST_OFFSETS else f"G{500 + n}"
 
     def _tilt(self, code: str) -> str:
         if any(_float(value) != 0.0 for value in re.findall(rf"[ABC]({_VALUE})", code.partition("19.")[2])):

@@ -117,20 +117,21 @@ def test_a_library_of_freecad_has_its_bits_in_a_folder_beside(tmp_path):
     file.write_text(json.dumps({"tools": entries, "version": 1}), encoding="utf-8")
     one, two, three = read_tools(file)
     assert dict(one.keys) == {"diameter_mm": 5.0, "teeth": 3, "flute_length_mm": INCH_MM, "kind": "flat"}
-    assert dict(two.keys) == {"diameter_mm": 3.0, "teeth": 2, "point_deg": 118.0, "kind": "drill"}
+    assert dict(two.keys) == {"diameter_mm": 3.0, "point_deg": 118.0, "kind": "drill"}  # teeth are left open
     assert "gone.fctb" in three.unread
 
 
 def test_a_table_of_linuxcnc_leaves_its_unit_open(tmp_path):
     file = tmp_path / "tool.tbl"
     file.write_text(
-        "T1 P1 D0.125 Z+0.511 ; 1/8 end mill 2 flute\nT2 P2 D6 ;ball\n; T9 D3\n", encoding="utf-8"
+        "T1 P1 D0.125 Z+0.511 ; 1/8 end mill 2 flute\nT2 P2 D6 ;ball\nT3 D3\n; T9 D3\n", encoding="utf-8"
     )
     with pytest.raises(NotUnderstoodError, match="unit"):
         read_tools(file)
     tools = keys(read_tools(file, "inch"))
     assert tools[1] == {"diameter_mm": pytest.approx(0.125 * INCH_MM), "teeth": 2, "kind": "flat"}
     assert tools[2]["kind"] == "ball"
+    assert "kind" not in tools[3]  # nothing says what it is
 
 
 def test_the_header_of_a_program_names_its_tools(tmp_path):
@@ -202,3 +203,15 @@ def test_a_cell_that_would_be_wrong_is_left_as_it_is(library, run, tmp_path):
     assert outcome.code == 2
     assert "shorter than the flutes" in outcome.err
     assert (tmp_path / "cell.toml").read_text(encoding="utf-8") == CELL
+
+
+def test_what_a_file_leaves_open_is_asked_and_not_made_up(run, tmp_path):
+    (tmp_path / "tool.tbl").write_text("T3 P3 D6\n", encoding="ascii")
+    bull = {"data": [fusion_tool(5, "bull nose end mill", DC=10, NOF=2)]}
+    (tmp_path / "library.json").write_text(json.dumps(bull), encoding="utf-8")
+    asked = run("tools", "import", "tool.tbl", "--unit", "mm")
+    assert "--set 3.kind=flat --set 3.teeth=2" in asked.err
+    assert "[tool.3]" not in asked.out
+    assert "--set 5.corner_radius_mm=0.5" in run("tools", "import", "library.json").err
+    stated = run("tools", "import", "tool.tbl", "--unit", "mm", "--set", "3.kind=flat", "--set", "3.teeth=4")
+    assert "teeth = 4" in stated.out

@@ -75,7 +75,7 @@ def test_the_processor_or_the_environment_chooses_the_build(build, expected):
 
 
 def test_a_core_of_other_sources_is_refused_with_the_remedy(monkeypatch):
-    monkeypatch.setattr(core, "_digest", lambda: "another")
+    monkeypatch.setattr(core, "sources_digest", lambda: "another")
     library = ctypes.CDLL(core._library()._name)
     if not (core._NATIVE / "core.h").exists():
         pytest.skip("no sources beside the installed package")
@@ -89,8 +89,17 @@ def test_a_missing_core_is_one_clear_line(monkeypatch, tmp_path):
         core._loaded("core")
 
 
-def test_the_build_has_one_digest_with_the_loader():
-    assert native("build").sources_digest() == core._digest()
+def test_a_change_of_any_source_of_the_core_is_noticed():
+    made = native("constants")
+    modules = {
+        *made.MODULES.values(),
+        made.FINDINGS,
+        *(name for name, _ in (*made.RECORDS.values(), *made.ARGUMENTS.values())),
+    }
+    sources = {path.relative_to(core._NATIVE.parent).as_posix() for path in core._sources()}
+    assert {f"{name.replace('.', '/')}.py" for name in modules} <= sources
+    assert {"native/core.c", "native/gcode/block.h", "gcode2krl/gcode/findings.toml"} <= sources
+    assert "native/constants.h" not in sources  # it is made of the others
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for the compiler")

@@ -27,7 +27,7 @@ ALLOWED = {
     # words that mean something else there
     "gap/beside/links/surface.py": {"mm", "diameter_mm"},  # a unit, and a key of a tool
     "gap/beside/links/vectors.py": {"mm"},
-    "gap/beside/arm_geometry.py": {"mm"},
+    "gap/choose/arm_geometry.py": {"mm"},
     "gap/fit/refitting.py": {"scale"},  # the field of `Free`
     "gap/fit/sensitivity.py": {"scale"},
     "effects/coefficients.py": {"diameter_mm"},  # of a cell's tool

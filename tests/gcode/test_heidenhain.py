@@ -137,7 +137,8 @@ def test_cycles_201_203_and_207():
         ("CC X+1 Y+1\nCP IPA+90 DR-", 2),
         ("CALL LBL 1\nL M2\nLBL 1\nL X+1", 1),
         ("L X+1 F100\nRND R5 F50\nL Y+9", 2),
-        ("CYCL DEF 247 DATUM ~\n Q339=+1\nCYCL DEF 247 DATUM ~\n Q339=+2", 3),
+        ("CYCL DEF 247 DATUM ~\n Q339=+0", 1),
+        ("CYCL DEF 247 DATUM ~\n Q339=Q5", 1),
         ("CYCL DEF 203 DRILL ~\n Q200=2 ~\n Q201=-9 ~\n Q206=1 ~\n Q202=2 ~\n Q203=0 ~\n Q208=0", 1),
         ("L C+30 FMAX", 1),
         ("Q1 = Q2 ^ 2", 1),
@@ -169,3 +170,16 @@ def test_inches_are_refused_and_a_finding_quotes_the_line_of_the_file():
     with pytest.raises(Gcode2KrlError) as refused:
         read(["10 L X+999999999 FMAX"])
     assert "QV" not in refused.value.issues[0].excerpt
+
+
+@pytest.mark.parametrize(("preset", "code"), [(1, "G54"), (4, "G57"), (5, "G505"), (99, "G599")])
+def test_a_preset_is_the_offset_that_the_cell_states(preset, code):
+    frame = {"x_mm": 100.0, "y_mm": 20.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
+    cell = over_demonstration({"work_offsets": {code: frame}})
+    lines = [f"10 CYCL DEF 247 DATUM ~\n Q339=+{preset} ;NUMBER", "11 L X+1 Y+2 FMAX"]
+    np.testing.assert_allclose(read(lines, cell=cell).position_mm[-1, :2], [101.0, 22.0])
+
+
+def test_a_preset_that_the_cell_does_not_state_is_reported():
+    issues = read(["10 CYCL DEF 247 DATUM ~\n Q339=+2 ;NUMBER", "11 L X+1 Y+2 FMAX"]).issues
+    assert "work-offset-unknown" in {issue.code for issue in issues}  # an error in a program for a robot

@@ -263,9 +263,9 @@ def _geometry(
 
 
 def _meeting(p: Floats, u: Floats, q: Floats, v: Floats) -> Floats:
-    """Return the point of the second line that is nearest to the first."""
-    across = np.cross(u, v)
-    return q + v * float(np.cross(p - q, u) @ across) / float(across @ across) * -1.0
+    """Return the point of the second line, q + t·v, that is nearest to the first, p + s·u."""
+    across = np.cross(v, u)  # the shortest way between both lies along it
+    return q + v * float(np.cross(p - q, u) @ across) / float(across @ across)
 
 
 def _distance(point: Floats, on_line: Floats, direction: Floats) -> float:

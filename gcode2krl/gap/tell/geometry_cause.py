@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from gcode2krl.gap.beside.arm_geometry import ArmGeometry
 from gcode2krl.gap.beside.links import MECHANICS
+from gcode2krl.gap.choose.arm_geometry import ArmGeometry
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.tell.result import AtPart, CauseResult, Gap
 from gcode2krl.gap.thresholds import THRESHOLDS

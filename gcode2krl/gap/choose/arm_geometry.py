@@ -21,8 +21,6 @@ from gcode2krl.identify.kinematics import (
 from gcode2krl.runs.measured import Poses
 
 _LIMITS = THRESHOLDS.fit
-_MOSTLY_FRAMES = 3.0
-"""So many times the arm's own errors are what base and tool are off by, and then the gap is theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,7 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmG
     ]
     good: Bools = ~fit.is_outlier
     before_mm = float(np.sqrt(np.mean(np.concatenate(raw)[good] ** 2)))
-    if left * before_mm > _MOSTLY_FRAMES * fit.rms_before_mm:
+    if left * before_mm > _LIMITS.poses_mostly_frames * fit.rms_before_mm:
         return None
     most = _LIMITS.poses_geometry_share * min(left * before_mm, fit.rms_before_mm)
     if fit.rms_after_mm > most:
