@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gcode2krl.compiled.core import FLOATS, OUT_FLOATS, core_function
 from tests.krc4 import oracle
 from tests.krc4.conftest import HEAD, K_S, polyline, straight
 
@@ -98,3 +99,17 @@ def test_nothing_is_reported_without_a_cost(run_program):
     for text, advance in ((STRAIGHT, "unlimited"), (straight([100, 80], [V_MM_S] * 2), 3)):
         issues = run_program(text, advance=advance).issues
         assert not any("unverified" in issue.message and "look" in issue.message for issue in issues)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_speed_at_a_vertex_is_the_largest_from_which_all_others_can_be_met(seed):
+    """Closed form beside the two passes: u_i² = min over j of v_j² + 2·Σ a·L of the runs between i and j."""
+    draw = np.random.default_rng(seed)
+    length = draw.uniform(0.0, 3.0, 40) * (draw.uniform(size=40) > 0.1)
+    acceleration = draw.uniform(500.0, 4000.0, 40)
+    bound = draw.uniform(0.0, 200.0, 41)
+    work = np.concatenate([[0.0], np.cumsum(2.0 * acceleration * length)])
+    wanted = np.sqrt(np.min(bound**2 + np.abs(work[:, None] - work), axis=1))
+    reached = bound.copy()
+    core_function("krc4_reachable", FLOATS, OUT_FLOATS, FLOATS)(length, reached, acceleration)
+    assert reached == pytest.approx(wanted, rel=1e-12)
