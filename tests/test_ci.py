@@ -9,9 +9,7 @@ SCRIPT = ROOT / ".ci" / "run"
 IN_TESTS = {
     "benchmarks/controls_twice.py": "tests/gcode/test_against_reference.py",
     "benchmarks/gap_calibrate.py": "tests/benchmarks/test_gap_calibrate.py",
-    "benchmarks/gap_identity.py": "tests/test_gap_identity.py",
     "benchmarks/gap_metamorphic.py": "tests/benchmarks/test_gap_metamorphic.py",
-    "benchmarks/gap_thresholds.py": "tests/benchmarks/test_gap_thresholds.py",
     "benchmarks/online_faults.py": "tests/online/test_faults.py",
     "benchmarks/restart.py": "tests/test_restart.py",
 }
