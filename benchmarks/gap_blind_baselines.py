@@ -6,6 +6,7 @@ clocks of the tables are fitted to each run first.
 """
 
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,8 @@ LEAST_GAIN = 0.02
 LASSO_STEPS, LASSO_SWEEPS, LASSO_NAMED = 12, 40, 0.25
 
 
-def baselines(folder: Path, predictions: dict[str, str]) -> dict[str, list]:
+def baselines(runs: Sequence[Any], predictions: dict[str, str]) -> dict[str, list]:
     """Return the effect and target that each method names, or an empty list."""
-    from gap_blind_run import loaded
-
-    runs, _ = loaded(folder)
     started = [run.head.started for run in runs]
     first = min(started)
     data, columns = [], []

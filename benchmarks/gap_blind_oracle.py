@@ -7,7 +7,6 @@ mismatch of the signal fitted beside it: per run a shift, a clock, for forces a 
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ LINK |= {"force": "FORCE", "tcp": "MECHANICS"}
 TRIALS = (0.25, 0.4, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0)
 
 
-def oracle(label: dict, result: dict, folder: Path) -> dict[str, Any] | None:
+def oracle(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> dict[str, Any] | None:
     """Return the power that the truth takes from the signal that the diagnosis reports; None if it cannot.
 
     In the squared unit of the report, a mean over the rows of all runs; none of them chose anything here, so
@@ -28,7 +27,7 @@ def oracle(label: dict, result: dict, folder: Path) -> dict[str, Any] | None:
     signal = (result.get("gap") or {}).get("signal")
     if signal not in LINK:
         return None
-    traces = _traces(LINK[signal], folder)
+    traces = _traces(LINK[signal], runs, prediction)
     entry = label["effects"][0]
     truth = _applied(entry, traces[0].inputs) if traces else None
     if truth is None:
@@ -46,15 +45,12 @@ def oracle(label: dict, result: dict, folder: Path) -> dict[str, Any] | None:
     return {"signal": signal, "before": before * unit, "removed": (gap - left) * unit}
 
 
-def _traces(link: str, folder: Path) -> list[Any]:
+def _traces(link: str, runs: Sequence[Any], prediction: Any) -> list[Any]:
     """Return the measured signal of a link beside its model, run by run."""
-    from gap_blind_run import loaded
-
     from gcode2krl.gap.beside import links
     from gcode2krl.gap.beside.pairing import pairs_of
 
-    runs, predictions = loaded(folder)
-    found: list[Any] = getattr(links, link).traces(list(pairs_of(predictions[0], runs)))
+    found: list[Any] = getattr(links, link).traces(list(pairs_of(prediction, runs)))
     return found
 
 

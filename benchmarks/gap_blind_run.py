@@ -99,18 +99,17 @@ def driven(plan: Plan, more: dict[str, Any], folder: Path, predictions: dict[str
     return label
 
 
-def loaded(folder: Path) -> tuple[list[Any], list[Prediction]]:
-    """Return the runs of a case and the prediction that each names."""
+def loaded(folder: Path) -> tuple[list[Any], Prediction]:
+    """Return the runs of a case and the prediction of the first."""
     runs = [load_run(each) for each in sorted(folder.glob("run-*"))]
-    return runs, [Prediction.load(run.path("prediction") or "") for run in runs]
+    return runs, Prediction.load(runs[0].path("prediction") or "")
 
 
 def answer(folder: Path, without: Sequence[str] = ()) -> dict[str, Any]:
     """Return the JSON object that the diagnosis of a case's runs gives."""
     from gcode2krl.gap import diagnose
 
-    runs = [load_run(each) for each in sorted(folder.glob("run-*"))]
-    prediction = Prediction.load(runs[0].path("prediction") or "")
+    runs, prediction = loaded(folder)
     return diagnose(prediction, runs, exclude=tuple(without)).as_dict()
 
 
@@ -129,9 +128,9 @@ def _beside(case: Case, folder: Path, how: How, record: dict[str, Any], predicti
     if how.oracle and possible and first["ratio"] >= 1.0:
         from gap_blind_oracle import oracle
 
-        record["oracle"] = oracle(label, record["result"], folder)
+        record["oracle"] = oracle(label, record["result"], *loaded(folder))
     beside = how.baselines and case.seed % how.baselines == 0
     if beside and case.kind in (*NULLS, "single"):
         from gap_blind_baselines import baselines
 
-        record["baselines"] = baselines(folder, predictions)
+        record["baselines"] = baselines(loaded(folder)[0], predictions)

@@ -97,7 +97,10 @@ def jobs(programs: int) -> Iterator[Job]:
     yield Job("batch", ("batch examples/contour_arcs.nc examples/cam_style.nc -o out/b --processes 1 -q",))
     yield Job("report", (f"predict {piece} -o out/p", "report out/p -o out/part.html"))
     dry = f"predict {piece} -o out/p --no-forces"
-    yield Job("diagnosis", (dry, "diagnose out/p examples/runs/run-1 examples/runs/run-2 examples/runs/run-3 --json"))
+    yield Job(
+        "diagnosis",
+        (dry, "diagnose out/p examples/runs/run-1 examples/runs/run-2 examples/runs/run-3 --json"),
+    )
     yield Job("make-test", ("make-test controller -o out/test.src --json",))
     yield Job("nominal", (f"predict {piece} -o out/p --json --no-forces", f"predict {piece} -o out/q --csv"))
     for k in range(programs):

@@ -10,13 +10,14 @@ from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.events import Span, rough_spans, sorted_out
+from gcode2krl.gap.beside.events import rough_spans, sorted_out
 from gcode2krl.gap.beside.holdout import split
 from gcode2krl.gap.beside.hum import without_hum
 from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.beside.retiming import on_own_timing
+from gcode2krl.gap.beside.trace import Span
 from gcode2krl.gap.choose.arm_geometry import geometry_of_arm
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.events import Whose, rough_spans, sorted_out
+from gcode2krl.gap.beside.events import rough_spans, sorted_out
+from gcode2krl.gap.beside.trace import Whose
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.tell.events import events_of, impulses_of
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave

@@ -18,7 +18,6 @@ level before and after it:
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -31,7 +30,7 @@ from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.holdout import with_rows
 from gcode2krl.gap.beside.interpolation import linear
 from gcode2krl.gap.beside.pulses import pulse_rows
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.trace import Event, Span, Trace, Whose
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.beside
@@ -50,38 +49,6 @@ _FAR, _RIDGE = 6.0, 1e-6
 """Robust deviations beyond which a row does not tell what follows the motion; columns of unit mean square."""
 _SAME_MM = 1e-3
 """Repeats of a program have the same path."""
-
-Span = tuple[float, float]
-"""Start and end in s of the table's stamps."""
-
-
-class Whose(Enum):
-    """What an event is."""
-
-    COMMAND = "in step with the command"
-    SLIP = "a change that stays"
-    IMPULSE = "an impulse"
-    INSTRUMENT = "a burst of the instrument"
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """One event of one run in one link's signal, in the link's inner unit."""
-
-    link: str
-    run: str
-    whose: Whose
-    span_s: Span
-    at_s: float
-    """Where it is largest; of a slip where the level has changed by half."""
-    line: int
-    """Of the G-code that the robot is on; 0 where it is on none."""
-    peak: Floats
-    """(k,) the largest deviation from the level around it."""
-    change: Floats
-    """(k,) by how much the level is another one behind it."""
-    power: float
-    """Sum of the squares of its deviations over its rows."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +14,38 @@ from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, lin
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-if TYPE_CHECKING:
-    from gcode2krl.gap.beside.events import Event
-
 LIMITS = THRESHOLDS.beside
+Span = tuple[float, float]
+"""Start and end in s of the table's stamps."""
+
+
+class Whose(Enum):
+    """What an event is."""
+
+    COMMAND = "in step with the command"
+    SLIP = "a change that stays"
+    IMPULSE = "an impulse"
+    INSTRUMENT = "a burst of the instrument"
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """One event of one run in one link's signal, in the link's inner unit."""
+
+    link: str
+    run: str
+    whose: Whose
+    span_s: Span
+    at_s: float
+    """Where it is largest; of a slip where the level has changed by half."""
+    line: int
+    """Of the G-code that the robot is on; 0 where it is on none."""
+    peak: Floats
+    """(k,) the largest deviation from the level around it."""
+    change: Floats
+    """(k,) by how much the level is another one behind it."""
+    power: float
+    """Sum of the squares of its deviations over its rows."""
 
 
 class Signal:
@@ -117,7 +145,7 @@ class Trace:
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
     """What was taken out of the measured values because it is the instrument's, in a person's words."""
-    events: "tuple[Event, ...]" = ()
+    events: tuple[Event, ...] = ()
     """What was rough or far off for a moment and is not in step with the command (`events`)."""
 
     @property

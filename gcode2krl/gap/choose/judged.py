@@ -5,9 +5,8 @@ from typing import Self
 
 from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied
-from gcode2krl.gap.beside.events import Event, Whose
 from gcode2krl.gap.beside.links.base import Link
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.trace import Event, Trace, Whose
 from gcode2krl.gap.choose.calibrated import probabilities_table
 from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.beside.events import Event, Whose
+from gcode2krl.gap.beside.trace import Event, Whose
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.tell.result import DependsOnResult, EventResult
 from gcode2krl.gap.thresholds import THRESHOLDS

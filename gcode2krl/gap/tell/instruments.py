@@ -6,8 +6,7 @@ import numpy as np
 
 from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.decimals import step_of
-from gcode2krl.gap.beside.events import Whose
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.beside.trace import Trace, Whose
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.fit.noise_source import are_repeats
 from gcode2krl.gap.fit.pose_noise import is_revisited
