@@ -11,13 +11,13 @@ from gcode2krl.errors import Issue, input_error
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import rough_spans, sorted_out
-from gcode2krl.gap.beside.holdout import split
+from gcode2krl.gap.beside.holdout import evenly_spread, split
 from gcode2krl.gap.beside.hum import without_hum
 from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING, Link
 from gcode2krl.gap.beside.log_alone import log_pairs
 from gcode2krl.gap.beside.pairing import pairs_of
 from gcode2krl.gap.beside.retiming import on_own_timing
-from gcode2krl.gap.beside.trace import Span
+from gcode2krl.gap.beside.trace import Span, Trace
 from gcode2krl.gap.choose.arm_geometry import geometry_of_arm
 from gcode2krl.gap.choose.candidates import question_of
 from gcode2krl.gap.choose.judgement import judge
@@ -27,6 +27,7 @@ from gcode2krl.gap.tell.assembly import answer
 from gcode2krl.gap.tell.geometry_cause import with_geometry
 from gcode2krl.gap.tell.lateness import late_by, with_lateness
 from gcode2krl.gap.tell.result import Gap
+from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.runs import Run
@@ -136,20 +137,37 @@ def _answered(context: Context, begin: Begin) -> Gap:
     ]
     context = _with_data(on_time)
     rough = _rough(context)
+    shares: dict[str, float] = {}
     links = begin("links")
     for count, link in enumerate(SIGNALS):
         links(count, len(SIGNALS))
         traces = link.traces(context.pairs, link.base(context))
         if traces:
             calm = without_hum(sorted_out(traces, _elsewhere(rough, link)))
-            explain, held = split(calm, context.explaining)
+            judged = evenly_spread(calm)
+            shares[link.name] = _rows(judged) / max(1, _rows(calm))
+            explain, held = split(judged, context.explaining)
             judgement = judge(link, explain, held, question_of(link, traces, context))
             context = link.learn(context.with_judgement(judgement), judgement)
     begin("part and answer")
     surface = judge_surface(PART, context)
     if surface is not None:
         context = context.with_judgement(surface)
-    return with_lateness(answer(context, slips, issues), late)
+    return with_lateness(answer(context, slips, [*issues, *_of_long_runs(shares)]), late)
+
+
+def _rows(traces: Sequence[Trace]) -> int:
+    return sum(len(trace.time_s) for trace in traces)
+
+
+def _of_long_runs(shares: Mapping[str, float]) -> list[Issue]:
+    """Return a note on the links of which a share of the rows alone was judged."""
+    told = [f"{link} {share:.0%}" for link, share in shares.items() if share < 1.0]
+    words = (
+        f"the runs are long: judged are evenly spread windows of {THRESHOLDS.beside.judged_window_s:g} s, of "
+        f"the rows of {', '.join(told)}; events are sought in all of them"
+    )
+    return [Issue("note", "run-long", 0, words)] if told else []
 
 
 def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:

@@ -13,6 +13,22 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 LIMITS = THRESHOLDS.beside
 
 
+def evenly_spread(traces: Sequence[Trace]) -> list[Trace]:
+    """Return the traces of a link, of long runs with the rows of evenly spread windows of time alone.
+
+    What the columns of all effects take in memory and time goes with the rows; what they tell of a cause goes
+    with the root of their number. Events are sought in all rows before.
+    """
+    share = LIMITS.judged_values / max(1, sum(trace.measured.size for trace in traces))
+    if share >= 1.0 or any(trace.still for trace in traces):
+        return list(traces)
+    kept = []
+    for trace in traces:
+        window = ((trace.time_s - trace.time_s[0]) / LIMITS.judged_window_s).astype(np.int64)
+        kept.append(with_rows(trace, np.floor((window + 1) * share) > np.floor(window * share)))
+    return kept
+
+
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:
     """Return the traces of the runs that explain, and the held-out ones; all explain if none would."""
     explain = [trace for trace in traces if trace.run_number < explaining]

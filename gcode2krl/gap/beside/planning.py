@@ -21,7 +21,7 @@ _SAME_S, _SAME_MM = 1e-9, 1e-6
 
 
 class RememberedPlan:
-    """A `Plan` that keeps its last results; ``finer`` samples the same motions more often."""
+    """A `Plan` that keeps its last results, of long programs fewer; ``finer`` samples it more often."""
 
     def __init__(self, plan: Callable[..., Motion], dt_s: float) -> None:
         """Take what plans targets for a cell, sampled every ``dt_s``."""
@@ -39,8 +39,10 @@ class RememberedPlan:
         )
         if key not in self._known:
             self._known[key] = self._plan(targets, cell, dt_s=self._dt_s)
-            if len(self._known) > LIMITS.remembered_plans:
-                self._known.popitem(last=False)
+            rows = sum(map(len, self._known.values()))
+            while len(self._known) > 1 and rows > LIMITS.remembered_plan_rows:
+                rows -= len(self._known.popitem(last=False)[1])
+        self._known.move_to_end(key)
         return self._known[key]
 
     def finer(self) -> Self:

@@ -165,7 +165,11 @@ class BesideThresholds:
         2e-5, "0.03 mm at an arm's length: the predicted path and the log's last decimal"
     )
 
-    remembered_plans: int = convention(64, "plans of one prediction that are kept")
+    judged_values: int = convention(
+        130_000, "of a link's measured values: of longer runs evenly spread windows are judged"
+    )
+    judged_window_s: float = convention(2.0, "of such a window: longer than an instrument remembers")
+    remembered_plan_rows: int = convention(300_000, "of the plans of one prediction: some 1.1 kB each")
     remembered_paths: int = convention(64, "commanded paths that are kept")
     remembered_rows: int = convention(300_000, "of these paths together: some 700 bytes each")
     log_ends_s: float = convention(
