@@ -106,16 +106,16 @@ def test_runs_that_explain_are_those_that_were_given_first():
 def test_of_long_runs_windows_all_over_the_time_are_judged():
     runs = [run(k, 4000.0) for k in range(2)]  # 400,000 values
     judged = evenly_spread(runs)
-    assert sum(each.measured.size for each in judged) == pytest.approx(130_000, rel=0.02)
+    assert sum(each.measured.size for each in judged) == pytest.approx(90_000, rel=0.02)
     for long, part in zip(runs, judged, strict=True):
         assert rows([part]) <= rows([long])
         gaps = np.diff(part.time_s, prepend=0.0, append=long.time_s[-1])
-        assert gaps.max() < 7.0  # windows of 2 s, a third of them
+        assert gaps.max() < 9.0  # windows of 2 s, a quarter of them
         lasts = [part.time_s[last - 1] - part.time_s[first] for first, last in part.segments]
         assert min(lasts[1:-1]) > 1.9
 
 
 def test_ordinary_runs_and_poses_are_judged_whole():
-    ordinary, poses = run(0, 2000.0), replace(run(0, 8000.0), still=True)
+    ordinary, poses = run(0, 1500.0), replace(run(0, 8000.0), still=True)
     assert evenly_spread([ordinary])[0] is ordinary
     assert evenly_spread([poses])[0] is poses

@@ -166,7 +166,7 @@ class BesideThresholds:
     )
 
     judged_values: int = convention(
-        130_000, "of a link's measured values: of longer runs evenly spread windows are judged"
+        90_000, "of a link's measured values: of longer runs evenly spread windows are judged"
     )
     judged_window_s: float = convention(2.0, "of such a window: longer than an instrument remembers")
     remembered_plan_rows: int = convention(300_000, "of the plans of one prediction: some 1.1 kB each")
