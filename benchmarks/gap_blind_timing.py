@@ -22,12 +22,12 @@ EFFECT, SIZE = "backlash@A2", 0.02
 
 
 def long_program(rows: int = ROWS) -> Writer:
-    """Rows along y, to and fro over the whole block until there are so many."""
+    """Rows along y, to and fro over the whole block until there are so many; back between those of before."""
     w = Writer("LONG", -4, -92, 30)
     w.rapid(z=2).feed(FEED_mm_s, z=-3)
     for i in range(rows):
         column = i % (2 * ROWS)
-        x = -4 + 9 * min(column, 2 * ROWS - 1 - column)
+        x = -4 + 9 * (column if column < ROWS else 2 * ROWS - 1.5 - column)
         w.feed(FEED_mm_s, x=x).feed(FEED_mm_s, y=92 if i % 2 == 0 else -92)
     return w.rapid(z=30)
 

@@ -169,9 +169,9 @@ class BesideThresholds:
         90_000, "of a link's measured values: of longer runs evenly spread windows are judged"
     )
     judged_window_s: float = convention(2.0, "of such a window: longer than an instrument remembers")
-    remembered_plan_rows: int = convention(300_000, "of the plans of one prediction: some 1.1 kB each")
+    remembered_plan_rows: int = convention(150_000, "of the plans of one prediction: some 1.1 kB each")
     remembered_paths: int = convention(64, "commanded paths that are kept")
-    remembered_rows: int = convention(300_000, "of these paths together: some 700 bytes each")
+    remembered_rows: int = convention(200_000, "of these paths together: some 700 bytes each")
     log_ends_s: float = convention(
         0.02, "a log alone may begin in motion: late samples of its first 20 ms have no model"
     )
