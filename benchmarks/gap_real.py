@@ -213,7 +213,7 @@ def rtde_rows(file: Path) -> Iterator["Row"]:
     gap = diagnose_log([run_from(file, name="run-1")])
     late = [c for c in gap.named_causes if c.target == "all"]
     words = f"{gap.verdict}: {_names(gap)}; {_shrunk(gap)}"
-    yield Row("RTDE log", "read without a question; no delay of all axes", words, not late)
+    yield Row("RTDE log", "read without a question; no delay of all axes (as first seen)", words, not late)
 
 
 def _shrunk(gap: Gap) -> str:

@@ -18,7 +18,7 @@ from gcode2krl.units import RAD_PER_DEG
 _LEAST = 10
 _AROUND_MM = 100.0
 """A measured orientation is read as three points so far from the tip."""
-_BEYOND_RAD, _BEYOND_M = 10.0, 20.0
+_BEYOND_RAD, _BEYOND_M = 15.0, 20.0
 """No joint turns by more, no instrument of a robot sees further: as in `runs.foreign.guess`."""
 _TARGET = re.compile(
     r"(?:(?:target|reflector|smr|point|ball|p)_?)?(?:([xyz])_?([1-9])|([1-9])_?([xyz]))(?:_(mm|m))?"
