@@ -6,7 +6,8 @@ alone; what is measured is printed beside what was expected. ``--runs DIR`` keep
 FOLDER the same is done with made-up logs, to try the program; they are not judged.
 
 ``--abb FOLDER``: a copy of icelinker/Robot-Calibration-LaserTracker (it states no licence: read, never
-passed on), whose poses are fitted. ``--cobot FILE``: tests/test.parquet of vorausrobotik/voraus-ad-dataset or a
+passed on), whose poses are fitted. ``--ur10 FOLDER``: a copy of christianlandgraf/ipa-robot-accuracy (MIT),
+likewise. ``--cobot FILE``: tests/test.parquet of vorausrobotik/voraus-ad-dataset or a
 copy of it (MIT). ``--rtde FILE``: analysis/Dataset_PowerAnalysis/CSV-Files/fig9.xlsx of
 ubc-systopia/dsn-2022-rad-artifact (MIT), a Universal Robots log as Excel keeps it.
 """
@@ -29,7 +30,7 @@ from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.identify.kinematics import arm_named, identify_kinematics, read_readings
 from gcode2krl.runs import load_run
-from gcode2krl.runs.foreign import run_from
+from gcode2krl.runs.foreign import read_table, run_from
 
 LOAD_ENCODERS = 3
 """A1 to A3 have one."""
@@ -167,6 +168,27 @@ def carried_over(logs: Sequence[Log], joint: int, late_s: float) -> list[float]:
 
 
 ABB_BEFORE_MM, ABB_AFTER_MM = (0.82, 0.92), 0.50
+
+
+UR10_BEFORE_MM, UR10_AFTER_MM = (0.5, 5.0), 0.30
+UR10_SERIES = ("Series_B/measurements_joint_configurations.csv", "Series_C/measurements_random_poses.csv")
+UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+
+
+def ur10_rows(folder: Path) -> Iterator["Row"]:
+    """Yield the lines of the table for the poses of a UR10: points of a tracker in mm, joints in rad."""
+    low, high = UR10_BEFORE_MM
+    for name in UR10_SERIES:
+        table = read_table(folder / name)
+        columns = {f"q{n}_rad": table.columns[f"{joint}_joint"] for n, joint in enumerate(UR_JOINTS, 1)}
+        columns |= {f"{axis}_mm": table.columns[f"measurement_{axis}"] for axis in "xyz"}
+        found = identify_kinematics(read_readings(columns), arm_named("UR10"))
+        before, after = found.rms_before_mm, found.rms_after_mm
+        poses = f"UR10, {name.partition('/')[0]}, {len(found.before_mm)} poses"
+        out = f"{before:.3f} mm; {int(found.is_outlier.sum())} points left out as outliers"
+        yield Row(f"{poses}, frame and tool", f"{low} to {high} mm", out, low <= before <= high)
+        agrees = after <= UR10_AFTER_MM
+        yield Row(f"{poses}, places left out", f"{UR10_AFTER_MM} mm or less", f"{after:.3f} mm", agrees)
 
 
 def read_abb(folder: Path) -> dict[str, Floats]:
@@ -336,11 +358,13 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
         "--runs", type=Path, help="folder for the runs that are written; by default they are removed"
     )
     parser.add_argument("--abb", type=Path, metavar="FOLDER", help="a copy of the poses of an ABB IRB 120")
+    parser.add_argument("--ur10", type=Path, metavar="FOLDER", help="a copy of the poses of a UR10")
     parser.add_argument("--cobot", type=Path, metavar="FILE", help="a Parquet table of voraus-AD")
     parser.add_argument("--rtde", type=Path, metavar="FILE", help="an RTDE log of a Universal Robots arm")
     given = parser.parse_args(arguments)
     tables = [
         *(abb_rows(read_abb(given.abb)) if given.abb else ()),
+        *(ur10_rows(given.ur10) if given.ur10 else ()),
         *(cobot_rows(given.cobot) if given.cobot else ()),
         *(rtde_rows(given.rtde) if given.rtde else ()),
     ]

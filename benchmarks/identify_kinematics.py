@@ -5,8 +5,8 @@ with 17 small errors, and hard ones with weight, play, eccentric encoders, drift
 Errors are root mean squares over places left out of the fit, in mm; "oracle" is the noise of a distance,
 sqrt(3) sigma. The peer is what a person writes with scipy: least squares on the 24 Denavit-Hartenberg numbers
 with base and tool, in as many lines as `_peer` has. ``--draws`` arms of each kind and maker, ``--poses`` of
-each. ``--pybotics PYTHON``: an interpreter that has pybotics (3.1.2 needs numpy < 2), which is a second peer on
-the same poses and folds: its modified Denavit-Hartenberg numbers, tool and world (benchmarks/peers).
+each. ``--pybotics PYTHON``: an interpreter that has pybotics (3.1.2 needs numpy < 2), a second peer on the
+same poses and folds: its modified Denavit-Hartenberg numbers, tool and world (benchmarks/peers).
 """
 
 import argparse
@@ -43,9 +43,7 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
     parser.add_argument("--poses", type=int, default=400)
     parser.add_argument("--pybotics", metavar="PYTHON", help="an interpreter that has pybotics")
     given = parser.parse_args(arguments)
-    met = [
-        *(figures(kind, given.draws, given.poses, write, given.pybotics) for kind in ("clean", "hard"))
-    ]
+    met = [*(figures(kind, given.draws, given.poses, write, given.pybotics) for kind in ("clean", "hard"))]
     write("every aim met" if all([*met, timed(write)]) else "not every aim met")
     return 0
 
@@ -124,7 +122,7 @@ def _peer(arm: pose_arms.MadeUp, table: pose_arms.Measured, folds: int = 5) -> f
 def _given(
     arm: pose_arms.MadeUp, table: pose_arms.Measured, folds: int = 5
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the numbers of the arm without errors, its angles, the points, and the places left out by turns."""
+    """Return the numbers of the arm without errors, its angles, the points, and the place of each."""
     rows = pose_arms.table_of(pose_arms.MadeUp(arm.name, arm.lengths_mm))
     theta = pose_arms.paper_angles(arm, table.q_deg * pose_arms.DEG)
     _, place = kmeans2(table.seen_mm, folds, minit="++", rng=np.random.default_rng(1))

@@ -179,7 +179,9 @@ def _nothing_compared(gap: Gap, context: Context) -> Issue:
                 remedy = f"[clocks] {name}_s in run.toml: what t_s reads where the prediction starts"
                 return Issue("error", "nothing-compared", 0, words, remedy)
     needs = "; ".join(f"{each.link}: {each.needs}" for each in gap.not_examined)
-    return Issue("error", "nothing-compared", 0, "the runs hold nothing that can be compared", f"record {needs}")
+    return Issue(
+        "error", "nothing-compared", 0, "the runs hold nothing that can be compared", f"record {needs}"
+    )
 
 
 def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:

@@ -1,4 +1,4 @@
-"""Where nothing was looked at, "no gap" would be a wrong answer: the diagnosis stops and says what to record."""
+"""Where nothing was looked at "no gap" would be wrong: the diagnosis stops and says what to record."""
 
 from pathlib import Path
 

@@ -152,8 +152,8 @@ class Model:
 def nominal_chain(q_rad: Floats, mm: Floats) -> Chain:
     """Return the chain of an arm without errors, of n rows in KUKA's joints and lengths (8,).
 
-    Where A6 is offset along A5 (``d5``), A4 is parallel to A2 and A3: its axis, along the forearm of other arms,
-    is turned by 90 deg, and turns of it about the forearm are an error of their own.
+    Where A6 is offset along A5 (``d5``), A4 is parallel to A2 and A3: its axis, along the forearm of other
+    arms, is turned by 90 deg, and a turn of it about the forearm is an error of its own.
     """
     a1, a2, b, c1, c2, c3, c4, d5 = mm
     chain = Chain(len(q_rad))

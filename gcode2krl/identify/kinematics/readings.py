@@ -60,7 +60,7 @@ def read_readings(
 
     Parameters
     ----------
-    source : a path (CSV of any separator, Parquet, MATLAB v5), or a frame as for `gcode2krl.run_from`.
+    source : a path (CSV of any separator, Excel, Parquet, MATLAB v5), or a frame as for `gcode2krl.run_from`.
     columns : their name → q1 … q6, x, y, z, x2 …, a, b, c, approach_1 …, t; "" leaves a column out.
     units : angle → deg or rad, length → mm or m, where their names and sizes leave it open.
 

@@ -11,6 +11,8 @@ from gcode2krl.errors import input_error
 _MOST_BYTES = 2_000_000_000
 """Of one part when unpacked: a sheet of 1,048,576 rows and 20 columns has about one."""
 
+_DAMAGED = (zipfile.BadZipFile, ParseError, KeyError, ValueError, IndexError, OSError, NotImplementedError)
+
 
 def lines_of_sheets(path: Path) -> list[list[str]]:
     """Return of each sheet its rows with cells separated by tabs; dates are days since 1899-12-30.
@@ -19,12 +21,15 @@ def lines_of_sheets(path: Path) -> list[list[str]]:
     """
     try:
         with zipfile.ZipFile(path) as book:
-            sheets = sorted(name for name in book.namelist() if re.fullmatch(r"xl/worksheets/[^/]+\.xml", name))
+            sheets = sorted(
+                name for name in book.namelist() if re.fullmatch(r"xl/worksheets/[^/]+\.xml", name)
+            )
             if any(book.getinfo(name).file_size > _MOST_BYTES for name in sheets):
-                raise input_error("trace-unreadable", "a sheet beyond 2 GB", "cut it to the run", source=str(path))
-            words = _shared_words(book)
-            return [_lines(book.open(name), words) for name in sheets]
-    except (zipfile.BadZipFile, ParseError, KeyError, ValueError, IndexError, OSError, NotImplementedError) as error:
+                words = "a sheet of more than 2 GB"
+                raise input_error("trace-unreadable", words, "cut it to the run", source=str(path))
+            shared = _shared_words(book)
+            return [_lines(book.open(name), shared) for name in sheets]
+    except _DAMAGED as error:
         text = f"not an Excel sheet, or a damaged one: {type(error).__name__}"
         raise input_error("trace-unreadable", text, "save it as CSV", source=str(path)) from None
 

@@ -31,8 +31,8 @@ _CYCLE_S = (2e-4, 0.5)
 _LATEST_S = 6e9
 """Seconds since 1970, 1904 or 1900 are fewer until 2090: 20240506070809 is no date in ms."""
 _BEYOND_RAD, _BEYOND_M, _BEYOND_KN = 15.0, 20.0, 10.0
-"""No joint turns by more (wrists of cobots by two turns either way), no robot reaches that far, no sensor of a
-robot bears more: our choice."""
+"""No joint turns by more (cobots turn twice either way), no robot reaches that far, no sensor of a robot
+bears more: our choice."""
 _NEEDED = re.compile(r"t|q\d_(cmd|act|load)|[xyz]|f[xyz]")
 """Quantities that a diagnosis compares: their unit must be known. Others are left out where it is not."""
 
