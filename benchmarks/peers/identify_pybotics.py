@@ -1,6 +1,6 @@
 """Fit an arm to poses with pybotics as its own example does; print the error at places left out, in mm.
 
-python identify_pybotics.py poses.npz   with mdh (6, 4), q_rad (n, 6), seen_mm (n, 3), place (n,), counts (n,),
+python identify_pybotics.py poses.npz   with mdh (6, 4), q_rad (n, 6), seen_mm (n, 3), place (n,), counts (n,)
                                         world (6,), tool (6,)
 """
 
