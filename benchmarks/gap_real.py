@@ -6,7 +6,10 @@ alone; what is measured is printed beside what was expected. ``--runs DIR`` keep
 FOLDER the same is done with made-up logs, to try the program; they are not judged.
 
 ``--abb FOLDER``: a copy of icelinker/Robot-Calibration-LaserTracker (it states no licence: read, never
-passed on), whose poses are fitted.
+passed on), whose poses are fitted. ``--ur10 FOLDER``: a copy of christianlandgraf/ipa-robot-accuracy (MIT),
+likewise. ``--cobot FILE``: tests/test.parquet of vorausrobotik/voraus-ad-dataset or a
+copy of it (MIT). ``--rtde FILE``: analysis/Dataset_PowerAnalysis/CSV-Files/fig9.xlsx of
+ubc-systopia/dsn-2022-rad-artifact (MIT), a Universal Robots log as Excel keeps it.
 """
 
 import argparse
@@ -17,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 from scipy.interpolate import CubicSpline
 from scipy.io import loadmat
 
@@ -26,6 +30,7 @@ from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.tell.result import Gap
 from gcode2krl.identify.kinematics import arm_named, identify_kinematics, read_readings
 from gcode2krl.runs import load_run
+from gcode2krl.runs.foreign import read_table, run_from
 
 LOAD_ENCODERS = 3
 """A1 to A3 have one."""
@@ -165,6 +170,27 @@ def carried_over(logs: Sequence[Log], joint: int, late_s: float) -> list[float]:
 ABB_BEFORE_MM, ABB_AFTER_MM = (0.82, 0.92), 0.50
 
 
+UR10_BEFORE_MM, UR10_AFTER_MM = (0.5, 5.0), 0.30
+UR10_SERIES = ("Series_B/measurements_joint_configurations.csv", "Series_C/measurements_random_poses.csv")
+UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+
+
+def ur10_rows(folder: Path) -> Iterator["Row"]:
+    """Yield the lines of the table for the poses of a UR10: points of a tracker in mm, joints in rad."""
+    low, high = UR10_BEFORE_MM
+    for name in UR10_SERIES:
+        table = read_table(folder / name)
+        columns = {f"q{n}_rad": table.columns[f"{joint}_joint"] for n, joint in enumerate(UR_JOINTS, 1)}
+        columns |= {f"{axis}_mm": table.columns[f"measurement_{axis}"] for axis in "xyz"}
+        found = identify_kinematics(read_readings(columns), arm_named("UR10"))
+        before, after = found.rms_before_mm, found.rms_after_mm
+        poses = f"UR10, {name.partition('/')[0]}, {len(found.before_mm)} poses"
+        out = f"{before:.3f} mm; {int(found.is_outlier.sum())} points left out as outliers"
+        yield Row(f"{poses}, frame and tool", f"{low} to {high} mm", out, low <= before <= high)
+        agrees = after <= UR10_AFTER_MM
+        yield Row(f"{poses}, places left out", f"{UR10_AFTER_MM} mm or less", f"{after:.3f} mm", agrees)
+
+
 def read_abb(folder: Path) -> dict[str, Floats]:
     """Return joints in deg and the first reflector in mm of a copy of the repository, by column."""
     place = folder / "4-DataProcess" / "Output"
@@ -180,6 +206,41 @@ def abb_rows(columns: Mapping[str, Floats]) -> Iterator["Row"]:
     yield Row("IRB 120, frame and tool", f"{low} to {high} mm", f"{before:.3f} mm", low <= before <= high)
     agrees = after <= ABB_AFTER_MM
     yield Row("IRB 120, places left out", f"{ABB_AFTER_MM} mm or less", f"{after:.3f} mm", agrees)
+
+
+# Logs of cobots
+
+
+COBOT_LATE_MS = (9.2, 10.2)
+
+
+def cobot_rows(file: Path) -> Iterator["Row"]:
+    """Yield the lines of the table for a table of several movements of a second, in radians."""
+    movements = pl.read_parquet(file).partition_by("sample", maintain_order=True)
+    read = [run_from(one, units={"angle": "rad"}, name=f"run-{n}") for n, one in enumerate(movements, 1)]
+    gap = diagnose_log(read)
+    low, high = COBOT_LATE_MS
+    late = next((c for c in gap.named_causes if (c.effect, c.target) == ("dead_time", "all")), None)
+    expected = f"dead time of all axes, {low} to {high} ms"
+    if late is None:
+        yield Row(f"cobot, {len(read)} movements", expected, f"{gap.verdict}: {_names(gap)}", False)
+        return
+    value, least, most = (1e3 * each for each in late.parameters["dead_time_s"])
+    words = f"{value:.2f} ms [{least:.2f}, {most:.2f}], p {late.probability:.2f}; {_shrunk(gap)}"
+    yield Row(f"cobot, {len(read)} movements", expected, words, low <= value <= high)
+
+
+def rtde_rows(file: Path) -> Iterator["Row"]:
+    """Yield the line of the table for one log of a Universal Robots arm."""
+    gap = diagnose_log([run_from(file, name="run-1")])
+    late = [c for c in gap.named_causes if c.target == "all"]
+    words = f"{gap.verdict}: {_names(gap)}; {_shrunk(gap)}"
+    yield Row("RTDE log", "read without a question; no delay of all axes (as first seen)", words, not late)
+
+
+def _shrunk(gap: Gap) -> str:
+    size = gap.gap
+    return f"{size.rms_before:.3g} -> {size.rms_after:.3g} {size.unit}"
 
 
 # What is printed
@@ -297,9 +358,18 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
         "--runs", type=Path, help="folder for the runs that are written; by default they are removed"
     )
     parser.add_argument("--abb", type=Path, metavar="FOLDER", help="a copy of the poses of an ABB IRB 120")
+    parser.add_argument("--ur10", type=Path, metavar="FOLDER", help="a copy of the poses of a UR10")
+    parser.add_argument("--cobot", type=Path, metavar="FILE", help="a Parquet table of voraus-AD")
+    parser.add_argument("--rtde", type=Path, metavar="FILE", help="an RTDE log of a Universal Robots arm")
     given = parser.parse_args(arguments)
-    if given.abb is not None:
-        return 0 if all(_printed(abb_rows(read_abb(given.abb)), write)) else 1
+    tables = [
+        *(abb_rows(read_abb(given.abb)) if given.abb else ()),
+        *(ur10_rows(given.ur10) if given.ur10 else ()),
+        *(cobot_rows(given.cobot) if given.cobot else ()),
+        *(rtde_rows(given.rtde) if given.rtde else ()),
+    ]
+    if tables:
+        return 0 if all(_printed(tables, write)) else 1
     logs = read_logs(given.folder) if given.folder else made_up_logs()
     with tempfile.TemporaryDirectory() as scratch:
         found = _printed(rows(logs, given.runs or Path(scratch)), write)

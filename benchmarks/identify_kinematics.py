@@ -5,12 +5,15 @@ with 17 small errors, and hard ones with weight, play, eccentric encoders, drift
 Errors are root mean squares over places left out of the fit, in mm; "oracle" is the noise of a distance,
 sqrt(3) sigma. The peer is what a person writes with scipy: least squares on the 24 Denavit-Hartenberg numbers
 with base and tool, in as many lines as `_peer` has. ``--draws`` arms of each kind and maker, ``--poses`` of
-each.
+each. ``--pybotics PYTHON``: an interpreter that has pybotics (3.1.2 needs numpy < 2), a second peer on the
+same poses and folds: its modified Denavit-Hartenberg numbers, tool and world (benchmarks/peers).
 """
 
 import argparse
 import inspect
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -29,6 +32,7 @@ from gcode2krl.identify.kinematics import (
 )
 from tests.plant import pose_arms
 
+PYBOTICS = Path(__file__).parent / "peers" / "identify_pybotics.py"
 AIMS = {"clean": 0.04, "ratio": 1.2, "coverage": (0.87, 0.93), "seconds": 10.0}
 
 
@@ -37,16 +41,19 @@ def main(arguments: Sequence[str] | None = None, write: Callable[[str], object] 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=3)
     parser.add_argument("--poses", type=int, default=400)
+    parser.add_argument("--pybotics", metavar="PYTHON", help="an interpreter that has pybotics")
     given = parser.parse_args(arguments)
-    met = [*(figures(kind, given.draws, given.poses, write) for kind in ("clean", "hard"))]
+    met = [*(figures(kind, given.draws, given.poses, write, given.pybotics) for kind in ("clean", "hard"))]
     write("every aim met" if all([*met, timed(write)]) else "not every aim met")
     return 0
 
 
-def figures(kind: str, draws: int, poses: int, write: Callable[[str], object]) -> bool:
+def figures(
+    kind: str, draws: int, poses: int, write: Callable[[str], object], pybotics: str | None = None
+) -> bool:
     """Print the figures of one kind of arm; True where the aims are met."""
     write(f"{kind} arms, {draws} of each maker, {poses} poses")
-    names = ("before", "after", "oracle", "ratio", "most", "peer")
+    names = ("before", "after", "oracle", "ratio", "most", "peer", *(["pybot."] if pybotics else []))
     write(f"  {'arm':<20} {' '.join(f'{name:>7}' for name in names)}  outliers found")
     inside, worst = [], 0.0
     for number, maker in enumerate(pose_arms.MAKERS):
@@ -57,9 +64,8 @@ def figures(kind: str, draws: int, poses: int, write: Callable[[str], object]) -
             found = identify_kinematics(read_readings(table.columns()), arm_named(maker.name))
             oracle = np.sqrt(3.0) * arm.noise_mm
             after = found.rms_after_mm
-            rows.append(
-                (found.rms_before_mm, after, oracle, after / oracle, after / oracle, _peer(arm, table))
-            )
+            peers = [_peer(arm, table), *([_of_pybotics(arm, table, pybotics)] if pybotics else [])]
+            rows.append((found.rms_before_mm, after, oracle, after / oracle, after / oracle, *peers))
             hits += ((found.is_outlier & table.is_wrong).sum(), table.is_wrong.sum())
             inside += _held(arm, found) if kind == "clean" else []
         shown = np.mean(rows, axis=0)
@@ -91,16 +97,15 @@ def timed(write: Callable[[str], object]) -> bool:
     identify_kinematics(readings, arm_named(pose_arms.KR300.name))
     seconds = time.perf_counter() - began
     lines = sum(len(inspect.getsource(each).splitlines()) for each in (_peer, _peer_tips))
+    script = sum(bool(line) for line in PYBOTICS.read_text(encoding="utf-8").split('"""')[2].splitlines())
     write(f"1,000 poses: {seconds:.1f} s (aim {AIMS['seconds']:.0f} s)")
-    write(f"a user writes {lines} lines for the peer and one command here")
+    write(f"a user writes {lines} lines for the peer, {script} with pybotics, and one command here")
     return seconds < AIMS["seconds"]
 
 
 def _peer(arm: pose_arms.MadeUp, table: pose_arms.Measured, folds: int = 5) -> float:
     """Return the error at places left out (outliers not counted) of least squares on Denavit-Hartenberg."""
-    rows, theta = pose_arms.table_of(pose_arms.MadeUp(arm.name, arm.lengths_mm)), table.q_deg * pose_arms.DEG
-    theta, seen = pose_arms.paper_angles(arm, theta), table.seen_mm
-    _, place = kmeans2(seen, folds, minit="++", rng=np.random.default_rng(1))
+    rows, theta, seen, place = _given(arm, table, folds)
     off = np.zeros(len(seen))
     start = np.concatenate([arm.place_mm, np.array(arm.turn_deg) * pose_arms.DEG, arm.tool_mm, np.zeros(25)])
     for fold in range(folds):
@@ -112,6 +117,30 @@ def _peer(arm: pose_arms.MadeUp, table: pose_arms.Measured, folds: int = 5) -> f
         found = least_squares(residual, start, x_scale="jac")
         off[~inside] = np.linalg.norm(_peer_tips(rows, theta[~inside], found.x) - seen[~inside], axis=1)
     return float(np.sqrt(np.mean(off[~table.is_wrong] ** 2)))
+
+
+def _given(
+    arm: pose_arms.MadeUp, table: pose_arms.Measured, folds: int = 5
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers of the arm without errors, its angles, the points, and the place of each."""
+    rows = pose_arms.table_of(pose_arms.MadeUp(arm.name, arm.lengths_mm))
+    theta = pose_arms.paper_angles(arm, table.q_deg * pose_arms.DEG)
+    _, place = kmeans2(table.seen_mm, folds, minit="++", rng=np.random.default_rng(1))
+    return rows, theta, table.seen_mm, place
+
+
+def _of_pybotics(arm: pose_arms.MadeUp, table: pose_arms.Measured, python: str) -> float:
+    """Return the error at places left out of pybotics, whose links turn about x before they turn about z."""
+    rows, theta, seen, place = _given(arm, table)
+    before = np.vstack([np.zeros(5), rows[:-1]])
+    mdh = np.column_stack([before[:, 3], before[:, 2], rows[:, 0], rows[:, 1]])
+    world = np.concatenate([arm.place_mm, np.array(arm.turn_deg) * pose_arms.DEG])
+    given = {"mdh": mdh, "q_rad": theta, "seen_mm": seen, "place": place, "counts": ~table.is_wrong}
+    with tempfile.TemporaryDirectory() as scratch:
+        file = Path(scratch) / "poses.npz"
+        np.savez(file, **given, world=world, tool=[*arm.tool_mm, 0.0, 0.0, 0.0])
+        done = subprocess.run([python, PYBOTICS, file], capture_output=True, text=True, check=True)
+    return float(done.stdout)
 
 
 def _peer_tips(rows: np.ndarray, theta: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.on_use import CommandsOnUse
 
 _WHAT = {
-    "import": "Make a run of a log: CSV of any separator, Parquet, MATLAB v5, RSI telegrams, a KRC trace."
+    "import": "Make a run of a log: CSV of any kind, Excel, Parquet, MATLAB v5, RSI telegrams, a KRC trace."
 }
 
 

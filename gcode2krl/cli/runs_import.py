@@ -58,7 +58,7 @@ def command(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Make a run of a log: CSV of any separator, Parquet, MATLAB v5, RSI telegrams, a KRC trace.
+    """Make a run of a log: CSV of any kind, Excel, Parquet, MATLAB v5, RSI telegrams, a KRC trace.
 
     It guesses what each column is and in which unit, and shows why. What it cannot know is a question, with
     the option that answers it. run.toml keeps the answers: the next log with these columns needs none.

@@ -7,7 +7,7 @@ from pathlib import Path
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.errors import Issue, input_error
+from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.gap.beside.clocks import with_controller_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.events import rough_spans, sorted_out
@@ -59,6 +59,8 @@ def diagnose(
     ------
     NotUnderstoodError
         No run, a run of another program than its prediction's, or a prediction without motion.
+    RefusedError
+        Nothing can be compared (``nothing-compared``), or positions are in a frame that no slip explains.
 
     Examples
     --------
@@ -95,6 +97,11 @@ def diagnose_log(
     if not runs:
         raise input_error("no-runs", "there is no run to diagnose", "name at least one run folder")
     pairs = tuple(log_pairs([*runs, *holdout], cell))
+    without = [run.name for run in (*runs, *holdout) if run.name not in {pair.name for pair in pairs}]
+    if without:
+        words = f"{', '.join(without)}: no joint angles, so nothing can be compared"
+        remedy = "record q1_cmd_deg … and q1_act_deg …, or name the prediction of the program that ran"
+        raise RefusedError(Issue("error", "nothing-compared", 0, words, remedy))
     known = known_effects(effects)
     return _diagnosed(Context(pairs, len(runs), known, mismatch or Mismatch(), seed=seed), begin)
 
@@ -108,6 +115,8 @@ def known_effects(extra: Sequence[str | Path | Effect]) -> dict[str, Effect]:
 def _diagnosed(context: Context, begin: Begin) -> Gap:
     """Return the answer; of poses that many errors of the arm explain, also what is beside these."""
     gap = _answered(context, begin)
+    if not gap.links and not gap.causes:
+        raise RefusedError(_nothing_compared(gap, context))
     if any(cause.words is not None for cause in gap.named_causes):
         return gap
     tip = next((link for link in gap.links if link.link == MECHANICS.name), None)
@@ -127,6 +136,9 @@ def _answered(context: Context, begin: Begin) -> Gap:
     context, slips, issues = set_up.context, set_up.slips, set_up.issues
     if set_up.is_final:
         return answer(context, slips, issues)
+    in_no_frame = [issue for issue in issues if issue.code == "run-frame" and issue.severity == "error"]
+    if in_no_frame and not slips:
+        raise RefusedError(in_no_frame)
     context = with_controller_clocks(context, PATH)
     on_time = context.with_pairs(on_own_timing(pair, SERVO) for pair in context.pairs)
     issues = [*issues, *_of_actual_joints(context, on_time)]
@@ -168,6 +180,27 @@ def _of_long_runs(shares: Mapping[str, float]) -> list[Issue]:
         f"the rows of {', '.join(told)}; events are sought in all of them"
     )
     return [Issue("note", "run-long", 0, words)] if told else []
+
+
+def _nothing_compared(gap: Gap, context: Context) -> Issue:
+    """Return why no link has data: the tables are of other times, or hold nothing that can be compared."""
+    for pair in context.pairs:
+        run, planned_s = pair.run, pair.inputs.time_s
+        for name, table in (("controller", run.controller), ("tracker", run.tracker), ("force", run.force)):
+            if table is None or pair.from_log:
+                continue
+            first, last = float(table.time_s[0]), float(table.time_s[-1])
+            if last < planned_s[0] or first > planned_s[-1]:
+                words = (
+                    f"{pair.name}: {name}: t_s is from {first:.6g} to {last:.6g} s, the prediction from "
+                    f"{planned_s[0]:.4g} to {planned_s[-1]:.4g} s: nothing can be compared"
+                )
+                remedy = f"[clocks] {name}_s in run.toml: what t_s reads where the prediction starts"
+                return Issue("error", "nothing-compared", 0, words, remedy)
+    needs = "; ".join(f"{each.link}: {each.needs}" for each in gap.not_examined)
+    return Issue(
+        "error", "nothing-compared", 0, "the runs hold nothing that can be compared", f"record {needs}"
+    )
 
 
 def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, robot
-from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gap import diagnose_log
 from gcode2krl.gap.beside.links import MECHANICS
 from gcode2krl.gap.beside.log_alone import log_pairs
@@ -165,8 +165,9 @@ def test_sound_poses_are_no_gap(tmp_path, seed):
 
 
 def test_without_a_known_robot_poses_say_nothing(tmp_path):
-    gap = diagnose_log([written(tmp_path / "run")])
-    assert "mechanics" in {each.link for each in gap.not_examined}
+    with pytest.raises(RefusedError, match="nothing that can be compared") as caught:
+        diagnose_log([written(tmp_path / "run")])
+    assert "a known robot" in caught.value.issues[0].remedy
 
 
 def test_many_small_errors_are_the_arms_own_geometry(tmp_path):

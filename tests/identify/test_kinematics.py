@@ -49,7 +49,7 @@ def test_without_errors_the_chain_is_the_robot_of_the_package():
     q = RNG.uniform(-2.0, 2.0, (40, 6))
     arm = arm_of(load_cell())
     place, rotation = flange_of(q, arm.mm)
-    wanted, turned = flange_pose(q, np.delete(arm.mm, 2))
+    wanted, turned = flange_pose(q, np.delete(arm.mm, [2, 7]))
     assert place == pytest.approx(wanted, abs=1e-9)
     assert rotation == pytest.approx(turned, abs=1e-12)
 
@@ -66,7 +66,28 @@ def test_signs_zeros_and_couplings_of_every_maker(arm):
     assert turns[0, 2, 2] == pytest.approx(1.0)
 
 
-def test_slopes_are_those_of_differences():
+def test_an_arm_with_three_parallel_axes_is_its_makers_table():
+    own, arm = RNG.uniform(-2.0, 2.0, (20, 6)), arm_named("UR10")
+    quarter = np.pi / 2.0
+    rows = np.array(
+        [
+            [0.0, 127.3, 0.0, quarter, 0.0],
+            [0.0, 0.0, -612.0, 0.0, 0.0],
+            [0.0, 0.0, -572.3, 0.0, 0.0],
+            [0.0, 163.941, 0.0, quarter, 0.0],
+            [0.0, 115.7, 0.0, -quarter, 0.0],
+            [0.0, 92.2, 0.0, 0.0, 0.0],
+        ]
+    )
+    place, rotation = flange_of(arm.kuka_rad(own), arm.mm)
+    frames = pose_arms.frames(rows, own)[6]
+    assert place == pytest.approx(frames[:, :3, 3], abs=1e-9)
+    turns = np.einsum("nji,njk->nik", rotation, frames[:, :3, :3])  # a flange may be turned about its axis
+    assert turns == pytest.approx(np.tile(turns[0], (20, 1, 1)), abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["KR 6 R900-2", "UR10"])
+def test_slopes_are_those_of_differences(model):
     q = RNG.uniform(-1.2, 1.2, (7, 6))
     rows = Poses(
         q_rad=q,
@@ -78,7 +99,7 @@ def test_slopes_are_those_of_differences():
         a3_by_a2=1.0,
     )
     base = (np.array([10.0, 20.0, 30.0]), rotation_of(np.array([[0.1, -0.2, 0.3]]))[0])
-    model = model_of(rows, arm_named("KR 6 R900-2").mm, base, np.array([[5.0, 6.0, 70.0], [8.0, -9.0, 60.0]]))
+    model = model_of(rows, arm_named(model).mm, base, np.array([[5.0, 6.0, 70.0], [8.0, -9.0, 60.0]]))
     theta = 1e-3 * RNG.normal(size=len(model.numbers))
     tips, slopes = model.slopes(theta)
     assert tips == pytest.approx(model.tips(theta), abs=1e-9)

@@ -1,12 +1,17 @@
 """Logs of other programs: read back to the right quantities, or asked about; never silently wrong."""
 
+import io
+import zipfile
+
 import numpy as np
 import polars as pl
 import pytest
+import scipy.io
 
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.runs.foreign import guess_of, run_from
-from tests.runs.foreign_layouts import ABC_DEG, LAYOUTS, PREDICTION, TIME_S, F, P, Q
+from gcode2krl.runs.foreign.names import meanings
+from tests.runs.foreign_layouts import ABC_DEG, LAYOUTS, PREDICTION, QUATERNION, TIME_S, F, P, Q
 
 WANTED = {
     "q_act": lambda run: (np.degrees(run.controller.q_act_rad), Q, 1e-4),
@@ -173,3 +178,87 @@ def test_what_a_run_before_said_is_doubted_by_the_values():
     assert not guess_of(columns, like=kept).questions
     in_degrees = {name: values if name == "time" else np.degrees(values) for name, values in columns.items()}
     assert len(guess_of(in_degrees, like=kept).questions) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("JT1[deg]", "q1_act"),
+        ("JT1_cmd[deg]", "q1_cmd"),
+        ("JntCmd[1]", "q1_cmd"),  # [1] is an index, no unit
+        ("/arm_controller/state/actual/positions[1]", "q1_act"),
+        ("/joint_states/position/joint_1", "q1_act"),
+        ("actual_joint_position_1", "q1_act"),
+        ("q_des_1", "q1_cmd"),
+        ("IRB_1 Joint 1 position (deg)", "q1_act"),
+        ("loadJointAngle1", "q1_load"),
+        ("data_set_1", ""),
+        ("tcp_pos_1", ""),
+        ("/joint_states/velocity/joint_1", ""),
+        ("torque_joint_1", ""),
+        ("target_actual_1", ""),
+        ("joint_10", ""),
+    ],
+)
+def test_a_joint_is_known_by_the_usual_words_in_any_order(name, column):
+    assert meanings([name])[name].target == column
+
+
+def test_a_count_of_rows_is_asked_for_and_another_time_goes_before_it():
+    axes = {f"A{n + 1}": Q[:, n] for n in range(6)}
+    count = {"time": np.arange(len(Q), dtype=float)}
+    (question,) = guess_of(count | axes).questions
+    assert "counts the rows" in question.text
+    guess = guess_of(count | {"timestamp": TIME_S + 4000.0} | axes)
+    assert [entry.name for entry in guess.entries if entry.target == "t"] == ["timestamp"]
+    assert not guess.questions
+
+
+def test_digits_of_a_date_are_no_milliseconds():
+    axes = {f"A{n + 1}": Q[:, n] for n in range(6)}
+    (question,) = guess_of({"Timestamp": 20200714163904.0 + 7.0 * np.arange(len(Q))} | axes).questions
+    assert question.option == "--unit time=UNIT"
+
+
+def test_four_numbers_of_length_one_are_no_joints():
+    turns = {f"Q{k}": part for k, part in enumerate(QUATERNION[:, [3, 0, 1, 2]].T)}
+    guess = guess_of({"t": TIME_S} | {f"{a} [mm]": P[:, k] for k, a in enumerate("XYZ")} | turns)
+    assert {entry.target for entry in guess.entries} == {"t", "x", "y", "z"}
+    assert set(turns) <= set(guess.left_out)
+
+
+EXCEL = [f"A{k}" for k in range(1, 7)]
+
+
+def sheet(rows):
+    """A sheet of numbers whose first row refers to shared words, as Excel writes it."""
+    words = ["Time [s]", *EXCEL]
+    cells = ["".join(f'<c r="{chr(65 + k)}1" t="s"><v>{k}</v></c>' for k in range(7))]
+    cells += [
+        "".join(f'<c r="{chr(65 + k)}{n}"><v>{v}</v></c>' for k, v in enumerate(row)) for n, row in rows
+    ]
+    body = "".join(f'<row r="{n}">{row}</row>' for n, row in enumerate(cells, 1))
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as file:
+        file.writestr(
+            "xl/sharedStrings.xml", "<sst>" + "".join(f"<si><t>{w}</t></si>" for w in words) + "</sst>"
+        )
+        file.writestr("xl/worksheets/sheet1.xml", "<worksheet><sheetData/></worksheet>")
+        file.writestr("xl/worksheets/sheet2.xml", f"<worksheet><sheetData>{body}</sheetData></worksheet>")
+    return stream.getvalue()
+
+
+def test_the_sheet_of_an_excel_file_that_is_a_table_is_read(tmp_path):
+    file = tmp_path / "log.xlsx"
+    file.write_bytes(sheet([(n, (t, *q)) for n, (t, q) in enumerate(zip(TIME_S, Q, strict=True), 2)]))
+    run = run_from(file)
+    np.testing.assert_allclose(np.degrees(run.controller.q_act_rad), Q, atol=1e-9)
+    np.testing.assert_allclose(run.controller.time_s, TIME_S - TIME_S[0], atol=1e-9)
+
+
+def test_a_structure_with_time_of_simulink_is_read(tmp_path):
+    values = {"values": np.radians(Q), "label": "q", "dimensions": 6}
+    file = tmp_path / "log.mat"
+    scipy.io.savemat(file, {"q_meas": {"time": TIME_S[:, None], "signals": values, "blockName": "arm"}})
+    run = run_from(file, units={"angle": "rad"})
+    np.testing.assert_allclose(np.degrees(run.controller.q_act_rad), Q, atol=1e-9)

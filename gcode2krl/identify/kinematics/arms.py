@@ -13,17 +13,17 @@ from gcode2krl.cell import Cell, library
 from gcode2krl.errors import input_error
 from gcode2krl.units import RAD_PER_DEG
 
-LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
+LENGTHS = ("a1", "a2", "b", "c1", "c2", "c3", "c4", "d5")
 _KUKA_SIGNS, _KUKA_OFFSETS_DEG = (-1.0, 1.0, 1.0, -1.0, 1.0, -1.0), (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """An arm with ortho-parallel base and spherical wrist."""
+    """An arm with ortho-parallel base, and a spherical wrist or one whose A4 is parallel to A2 and A3."""
 
     model: str
     mm: Floats
-    """(7,) a1, a2, b, c1, c2, c3, c4."""
+    """(8,) a1, a2, b, c1, c2, c3, c4, d5; d5, between A4 and A6 along A5, is 0 with a spherical wrist."""
     signs: Floats
     """(6,) of the controller's joints against those of Brandstötter, Angerer and Hofbaur 2014."""
     offsets_rad: Floats
@@ -49,7 +49,7 @@ def _listed() -> dict[str, Arm]:
     return {
         entry["model"]: Arm(
             model=entry["model"],
-            mm=np.array([entry["mm"][name] for name in LENGTHS], dtype=float),
+            mm=np.array([entry["mm"].get(name, 0.0) for name in LENGTHS], dtype=float),
             signs=np.array(entry["signs"], dtype=float),
             offsets_rad=RAD_PER_DEG * np.array(entry["offsets_deg"], dtype=float),
             a3_by_a2=float(entry["a3_by_a2"]),
@@ -62,7 +62,7 @@ def _listed() -> dict[str, Arm]:
 def arm_of(cell: Cell) -> Arm:
     """Return the arm of a cell; raises `RefusedError` where its lengths are not stated."""
     a1, a2, c1, c2, c3, c4 = cell.robot.geometry.array()
-    return _kuka(cell.robot.model, np.array([a1, a2, 0.0, c1, c2, c3, c4]))
+    return _kuka(cell.robot.model, np.array([a1, a2, 0.0, c1, c2, c3, c4, 0.0]))
 
 
 def _kuka(model: str, mm: Floats) -> Arm:
@@ -88,6 +88,6 @@ def all_arms() -> dict[str, Arm]:
     for model in library.names("robots"):
         geometry = library.read_model("robots", model).get("geometry", {})
         if "a1_mm" in geometry:
-            mm = [0.0 if name == "b" else float(geometry[f"{name}_mm"]) for name in LENGTHS]
+            mm = [0.0 if name in ("b", "d5") else float(geometry[f"{name}_mm"]) for name in LENGTHS]
             found[model] = _kuka(model, np.array(mm))
     return found

@@ -150,8 +150,12 @@ class Model:
 
 
 def nominal_chain(q_rad: Floats, mm: Floats) -> Chain:
-    """Return the chain of an arm without errors, of n rows in KUKA's joints and lengths (7,)."""
-    a1, a2, b, c1, c2, c3, c4 = mm
+    """Return the chain of an arm without errors, of n rows in KUKA's joints and lengths (8,).
+
+    Where A6 is offset along A5 (``d5``), A4 is parallel to A2 and A3: its axis, along the forearm of other
+    arms, is turned by 90 deg, and a turn of it about the forearm is an error of its own.
+    """
+    a1, a2, b, c1, c2, c3, c4, d5 = mm
     chain = Chain(len(q_rad))
     for axis, letter in enumerate("xyz"):
         chain.shift(f"base {letter}", axis)
@@ -170,10 +174,12 @@ def nominal_chain(q_rad: Floats, mm: Floats) -> Chain:
     chain.shift("a2", 2, -a2)
     chain.shift("b", 1, b)
     chain.shift("c3", 0, c3)
-    chain.turn("A4 tilt", 2)
+    if d5:
+        chain.turn("A4 twist", 0)
+    chain.turn("A4 tilt", 2, np.pi / 2.0 if d5 else 0.0)
     chain.turn("A4", 0, turns[:, 3])
     chain.shift("A5 beside A4", 2)
-    chain.shift("A5 across", 1)
+    chain.shift("A5 across", 1, d5)
     chain.turn("A5 tilt", 2)
     chain.turn("A5", 1, turns[:, 4])
     chain.shift("A6 beside A5", 2)
@@ -207,7 +213,7 @@ def model_of(
 
     Parameters
     ----------
-    mm : (7,) lengths of the arm.
+    mm : (8,) lengths of the arm.
     base : place (3,) in mm and rotation (3, 3) of the root in the instrument's frame, about which is fitted.
     tools_mm : (t, 3) targets in the flange, about which is fitted.
     groups : keys of `GROUPS` that are fitted; base and tool always are.
@@ -263,8 +269,9 @@ def _add_lengths(model: Model, poses: Poses) -> None:
 
 
 def _add_axes(model: Model, poses: Poses) -> None:
-    for name in ("A2 tilt", "A3 tilt", "A3 twist", "A4 tilt", "A5 tilt", "A6 tilt"):
-        model.add(name, "axes", _AXIS_RAD, [(name, 1.0)], unit="mrad")
+    for name in ("A2 tilt", "A3 tilt", "A3 twist", "A4 tilt", "A4 twist", "A5 tilt", "A6 tilt"):
+        if name in model.chain.motions:
+            model.add(name, "axes", _AXIS_RAD, [(name, 1.0)], unit="mrad")
 
 
 def _add_wrist(model: Model, poses: Poses) -> None:

@@ -18,7 +18,7 @@ from gcode2krl.units import RAD_PER_DEG
 _LEAST = 10
 _AROUND_MM = 100.0
 """A measured orientation is read as three points so far from the tip."""
-_BEYOND_RAD, _BEYOND_M = 10.0, 20.0
+_BEYOND_RAD, _BEYOND_M = 15.0, 20.0
 """No joint turns by more, no instrument of a robot sees further: as in `runs.foreign.guess`."""
 _TARGET = re.compile(
     r"(?:(?:target|reflector|smr|point|ball|p)_?)?(?:([xyz])_?([1-9])|([1-9])_?([xyz]))(?:_(mm|m))?"
@@ -60,7 +60,7 @@ def read_readings(
 
     Parameters
     ----------
-    source : a path (CSV of any separator, Parquet, MATLAB v5), or a frame as for `gcode2krl.run_from`.
+    source : a path (CSV of any separator, Excel, Parquet, MATLAB v5), or a frame as for `gcode2krl.run_from`.
     columns : their name → q1 … q6, x, y, z, x2 …, a, b, c, approach_1 …, t; "" leaves a column out.
     units : angle → deg or rad, length → mm or m, where their names and sizes leave it open.
 

@@ -28,9 +28,11 @@ ORDERS = {
 _SAID = "you said so"
 _CYCLE_S = (2e-4, 0.5)
 """Shortest and longest step of a recording of a motion: 5 kHz to 2 Hz, our choice."""
-_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-_BEYOND_RAD, _BEYOND_M, _BEYOND_KN = 10.0, 20.0, 10.0
-"""No joint turns by more, no robot reaches that far, no sensor of a robot bears more: our choice."""
+_LATEST_S = 6e9
+"""Seconds since 1970, 1904 or 1900 are fewer until 2090: 20240506070809 is no date in ms."""
+_BEYOND_RAD, _BEYOND_M, _BEYOND_KN = 15.0, 20.0, 10.0
+"""No joint turns by more (cobots turn twice either way), no robot reaches that far, no sensor of a robot
+bears more: our choice."""
 _NEEDED = re.compile(r"t|q\d_(cmd|act|load)|[xyz]|f[xyz]")
 """Quantities that a diagnosis compares: their unit must be known. Others are left out where it is not."""
 
@@ -141,7 +143,8 @@ def guessed(
     free = any(m.free_order for m in known.values()) and not joints
     if joints:
         known = {name: m._replace(target=_reordered(m.target, joints)) for name, m in known.items()}
-    known = _once(known, columns)
+    known = _without_quaternion(table, known, columns)
+    known = _once(table, known, columns)
     seconds = next((table.columns[name] for name, m in known.items() if m.target == "t"), np.zeros(0))
     if (seconds % 1.0 != 0.0).any():  # parts of a second belong to whole ones only
         known = {name: m for name, m in known.items() if m.target != "t_fraction"}
@@ -195,9 +198,24 @@ def _reordered(target: str, joints: str) -> str:
     return f"{match[1]}{joints[int(match[2]) - 1]}{match[3]}" if match else target
 
 
-def _once(known: Mapping[str, Meaning], columns: Mapping[str, str]) -> dict[str, Meaning]:
-    """Return the first column of each target, those that a person named before others."""
-    ordered = sorted(known, key=lambda name: name not in columns)
+def _without_quaternion(
+    table: Table, known: Mapping[str, Meaning], columns: Mapping[str, str]
+) -> dict[str, Meaning]:
+    """Return the columns without Q0 to Q3 that are a quaternion, whose order the name does not tell."""
+    names = [name for name, m in known.items() if re.fullmatch(r"q\d_act", m.target) and name not in columns]
+    if len(names) == 4:
+        length = np.linalg.norm([table.columns[name] for name in names], axis=0)
+        if np.nanmax(np.abs(length - 1.0)) < 1e-3:
+            return {name: m for name, m in known.items() if name not in names}
+    return dict(known)
+
+
+def _once(table: Table, known: Mapping[str, Meaning], columns: Mapping[str, str]) -> dict[str, Meaning]:
+    """Return the first column of each target, those that a person named before others, a row count last."""
+    ordered = sorted(
+        known,
+        key=lambda name: (name not in columns, known[name].target == "t" and _counts(table.columns[name])),
+    )
     taken: dict[str, str] = {}
     for name in ordered:
         taken.setdefault(known[name].target, name)
@@ -240,12 +258,11 @@ class _Work:
         if self.known[name].unit:
             self._doubt_time(name, values)
             return
-        largest = float(np.nanmax(np.abs(values), initial=0.0))
-        epoch = next((unit for least, unit in _EPOCHS if largest > least), "")
-        if epoch:
-            self.set_unit([name], epoch, f"a date in {epoch}")
-            return
         fit = self._cycles(values)
+        if _counts(values):
+            words = f"{name}: counts the rows; is it the time, and in which unit?"
+            self.questions.append(Question(words, f"--unit time={'|'.join(fit)} or --columns NAME=t"))
+            return
         if len(fit) > 1 and self.plan is not None:
             fit = [unit for unit in fit if unit in time_units(values, self.plan)] or fit
         if len(fit) == 1:
@@ -255,9 +272,11 @@ class _Work:
             self.questions.append(Question(words, f"--unit time={'|'.join(fit) or 'UNIT'}"))
 
     def _cycles(self, values: Floats) -> list[str]:
-        step = _step(values)
+        """Return the units in which rows are as far apart as recorders write them, and dates are dates."""
+        step, largest = _step(values), float(np.nanmax(np.abs(values), initial=0.0))
         shortest, longest = _CYCLE_S
-        return [unit for unit, size in FACTORS["time"].items() if shortest <= step * size <= longest]
+        sizes = FACTORS["time"].items()
+        return [unit for unit, s in sizes if shortest <= step * s <= longest and largest * s < _LATEST_S]
 
     def _doubt_time(self, name: str, values: Floats) -> None:
         """Ask where a stated unit makes steps that no recording has."""
@@ -444,6 +463,12 @@ class _Work:
 def _step(values: Floats) -> float:
     steps = np.diff(values[np.isfinite(values)])
     return float(np.median(np.abs(steps))) if len(steps) else 0.0
+
+
+def _counts(values: Floats) -> bool:
+    """Tell whether values (n,) are 0, 1, 2 …: rows or frames, whose rate only a person knows."""
+    steps = np.diff(values[np.isfinite(values)])
+    return len(steps) > 0 and bool((steps == 1.0).all())
 
 
 def _entry(table: Table, name: str, meaning: Meaning) -> Entry:

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gcode2krl.units import DEG_PER_RAD, MM_PER_INCH, MM_PER_M, N_PER_KN, NMM_PER_NM
 
 FACTORS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "d": 86400.0},
     "angle": {"deg": 1.0, "rad": DEG_PER_RAD, "mdeg": 1e-3, "mrad": 1e-3 * DEG_PER_RAD},
     "length": {"mm": 1.0, "m": MM_PER_M, "um": 1e-3, "cm": 10.0, "in": MM_PER_INCH},
     "force": {"N": 1.0, "kN": N_PER_KN},
@@ -22,7 +22,7 @@ FACTORS: dict[str, dict[str, float]] = {
 }
 """Kind of quantity -> unit -> its size in the unit of docs/runs.md, which is the first."""
 _SPELLINGS = {
-    **{unit.lower(): unit for units in FACTORS.values() for unit in units},
+    **{unit.lower(): unit for units in FACTORS.values() for unit in units if unit != "1"},
     **{"°": "deg", "degree": "deg", "degrees": "deg", "m°": "mdeg", "radian": "rad", "radians": "rad"},
     **{"sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "µm": "um"},
     **{"inch": "in", "n·m": "Nm", "n*m": "Nm", "n.m": "Nm", "°c": "C", "degc": "C", "newton": "N"},
@@ -31,7 +31,7 @@ _TRAILING = ("deg", "degrees", "rad", "mm", "m", "um", "n", "kn", "nm", "nmm", "
 """Units that a name may end in, after an underscore."""
 _BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]{1,12}?)\s*[\])>}]\s*$")
 _OTHER_QUANTITIES = re.compile(
-    r"vel|speed|acc|jerk|torque|current|temp|force|effort|power|err|lag|stat|mode|volt|moment|strom|geschw"
+    r"vel|speed|acc|jerk|torque|current|temp|force|effort|power|err|lag|status|mode|volt|moment|strom|geschw"
     r"|schlepp|dev|diff|delta|noise|limit|(?:^|_)(?:d|dd|v|qd|qdd|std)(?:_|$)"
 )
 """Words of quantities that a pattern must have itself: the current of an axis is none of its angles."""
@@ -73,8 +73,13 @@ class _Pattern:
 
 
 @cache
-def _patterns() -> tuple[_Pattern, ...]:
+def _exporters() -> dict[str, Any]:
     text = files("gcode2krl.runs.foreign").joinpath("exporters.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+@cache
+def _patterns() -> tuple[_Pattern, ...]:
     return tuple(
         _Pattern(
             re.compile(name.replace("{n}", r"(?P<n>\d)")),
@@ -85,7 +90,7 @@ def _patterns() -> tuple[_Pattern, ...]:
             exporter.get("mark", ""),
             exporter["order"],
         )
-        for exporter in tomllib.loads(text)["exporter"]
+        for exporter in _exporters()["exporter"]
         for name, target, unit, *flags in exporter["columns"]
     )
 
@@ -106,6 +111,7 @@ def meanings(names: Iterable[str]) -> dict[str, Meaning]:
     plain = {name: _plain(name) for name in names}
     marks = {whole for whole, _, _ in plain.values()}
     found = {name: _meaning(*plain[name], marks) for name in names}
+    found = {name: m if m.target else _joint(name, m.unit) for name, m in found.items()}
     stems = {re.sub(r"\d", "#", m.target) for m in found.values() if re.fullmatch(r"\D+0\D*", m.target)}
     return {
         name: m._replace(target=re.sub(r"\d", lambda digit: str(int(digit[0]) + 1), m.target))
@@ -147,3 +153,26 @@ def _meaning(whole: str, stem: str, unit: str, marks: set[str]) -> Meaning:
             why = f"{pattern.exporter}" if not stated else f"{pattern.exporter}; {stated}"
             return Meaning(target, fixed or pattern.unit, why, pattern.order, pattern.free_order)
     return Meaning("", unit)
+
+
+def _joint(name: str, unit: str) -> Meaning:
+    """Return the joint that a name of usual words stands for: ``actual_joint_position_0``, ``JT1[deg]``."""
+    words: dict[str, list[str]] = _exporters()["joints"]
+    kind = {word: kind for kind, listed in words.items() for word in listed}
+    bracket = _BRACKETS.search(name)
+    stem = name[: bracket.start()] if bracket and unit_of(bracket[1]) else name
+    parts = [part.lower() for part in re.findall(r"[A-Z]?[a-z]+|[A-Z]+|\d+", stem)]
+    if parts and parts[-1] in _TRAILING and parts[-1] not in kind:
+        parts.pop()
+    number = next((k for k in reversed(range(len(parts))) if parts[k].isdigit()), -1)
+    first = next((k for k in reversed(range(number)) if parts[k] not in kind), -1) + 1
+    used = {kind.get(part, "") for part in (*parts[first:number], *parts[number + 1 :])}
+    sides = used & {"cmd", "act", "load"}
+    named = "joint" in used or (sides and first == 0)
+    if number < 0 or len(parts[number]) > 1 or "" in used or len(sides) > 1 or not named:
+        return Meaning("", unit)
+    if _OTHER_QUANTITIES.search("_".join(parts[:first])):
+        return Meaning("", unit)
+    fixed = unit if unit in FACTORS["angle"] else ""
+    why = "usual names; the name states the unit" if fixed else "usual names"
+    return Meaning(f"q{parts[number]}_{sides.pop() if sides else 'act'}", fixed, why)

@@ -3,8 +3,8 @@
 import csv
 import io
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.files.parquet_guard import MAGIC, DamagedError, read_parquet
+from gcode2krl.runs.foreign.excel import lines_of_sheets
 from gcode2krl.runs.foreign.names import unit_of
 from gcode2krl.runs.tables import numbers, printable, refuse_twins
 
@@ -26,10 +27,9 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _NOTHING = ("", "nan", "null", "none", "na", "inf", "-inf")
 _STAMPS = (
     "%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f", "%Y/%m/%d %H:%M:%S%.f", "%d.%m.%Y %H:%M:%S%.f",
-    "%m/%d/%Y %H:%M:%S%.f", "%d/%m/%Y %H:%M:%S%.f", "%m/%d/%Y %I:%M:%S%.f %p",
+    "%m/%d/%Y %H:%M:%S%.f", "%d/%m/%Y %H:%M:%S%.f", "%m/%d/%Y %I:%M:%S%.f %p", "%d-%m-%Y %H:%M:%S%.f",
 )  # fmt: skip
 _OTHER_FORMATS = {
-    b"PK\x03\x04": "an Excel sheet: save it as CSV",
     b"\xd0\xcf\x11\xe0": "an old Excel sheet: save it as CSV",
     b"\x89HDF\r\n": "an HDF5 file: save it as MATLAB v5 (save … -v6) or as CSV",
 }
@@ -58,7 +58,7 @@ class Table:
 
 
 def read_table(path: str | Path) -> Table:
-    """Read CSV of any separator and decimal sign, Parquet or MATLAB v5.
+    """Read CSV of any separator and decimal sign, Excel, Parquet or MATLAB v5.
 
     Raises `NotUnderstoodError`: unreadable, no table, another format, a value that is not a number.
     """
@@ -81,6 +81,8 @@ def read_table(path: str | Path) -> Table:
             raise input_error("trace-unreadable", words, "export it again", source=str(file)) from None
     if data.startswith(b"MATLAB 5.0"):
         return _of_matlab(file)
+    if data.startswith(b"PK\x03\x04"):
+        return _of_excel(file)
     return _of_text(_decoded(data), file)
 
 
@@ -183,7 +185,7 @@ def _is_value(cell: str) -> bool:
 
 
 def _is_stamp(cell: str) -> bool:
-    return re.match(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\d{1,2}:\d\d|\d{1,2}:\d\d:\d\d", cell) is not None
+    return re.match(r"'?\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\d{1,2}:\d\d|\d{1,2}:\d\d:\d\d", cell) is not None
 
 
 def _shape(lines: list[str], separator: str, file: Path) -> _Shape | None:
@@ -255,7 +257,7 @@ def _stamps(text: "pl.Series") -> "pl.Series | None":
     first = text.drop_nulls().head(1)
     if not len(first) or not _is_stamp(str(first[0])):
         return None
-    text = text.str.replace(r",(\d+)", ".$1").str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
+    text = text.str.strip_prefix("'").str.replace(r",(\d+)", ".$1").str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
     for form in _STAMPS:
         stamps = text.str.to_datetime(form, time_unit="us", strict=False)
         if stamps.null_count() == text.null_count():
@@ -271,6 +273,31 @@ def _seconds(stamps: "pl.Series") -> Floats:
     return np.asarray(passed.cast(pl.Float64).fill_null(float("nan")).to_numpy() * 1e-6, dtype=np.float64)
 
 
+def _of_excel(file: Path) -> Table:
+    """Return the first sheet that is a table; the last one's error where none is."""
+    refused: NotUnderstoodError | None = None
+    for lines in lines_of_sheets(file):
+        try:
+            return replace(_of_text("\n".join(lines), file), how="Excel")
+        except NotUnderstoodError as error:
+            refused = error
+    raise refused or input_error("trace-empty", "no sheet", "export the recording again", source=str(file))
+
+
+def _leaves(variables: Mapping[str, Any], parent: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the arrays of variables and of the fields of structures, each by its own name.
+
+    What Simulink calls signals or values is named by the structure around it.
+    """
+    for name, value in variables.items():
+        own = parent if name in ("signals", "values", "data") and parent else name
+        if isinstance(value, np.ndarray) and value.dtype.names:
+            if value.ndim == 0:
+                yield from _leaves({field: value[field].item() for field in value.dtype.names}, own)
+        elif isinstance(value, np.ndarray):
+            yield own, value
+
+
 def _of_matlab(file: Path) -> Table:
     """Return the vectors and matrices of a MATLAB v5 file that have as many rows as most of them."""
     import polars as pl
@@ -282,15 +309,10 @@ def _of_matlab(file: Path) -> Table:
         words = f"a damaged MATLAB file: {type(error).__name__}"
         raise input_error("trace-unreadable", words, "export it again", source=str(file)) from None
     arrays: dict[str, Floats] = {}
-    for name, value in variables.items():
-        if name.startswith("__") or not isinstance(value, np.ndarray):
-            continue
-        fields = value.dtype.names
-        parts = {each: value[each].item() for each in fields} if fields else {name: value}
-        for part, held in parts.items():
-            part = f"{name}_{part}" if part in arrays else part
-            if isinstance(held, np.ndarray) and held.dtype.kind in "fiu" and held.ndim in (1, 2):
-                arrays[part] = held if held.ndim == 1 or held.shape[0] >= held.shape[1] else held.T
+    for name, held in _leaves({name: v for name, v in variables.items() if not name.startswith("__")}):
+        if held.dtype.kind in "fiu" and held.ndim in (1, 2):
+            name = name if name not in arrays else f"{name}_{len(arrays)}"
+            arrays[name] = held if held.ndim == 1 or held.shape[0] >= held.shape[1] else held.T
     rows = max((len(array) for array in arrays.values()), default=0)
     made: dict[str, Floats] = {}
     for name, array in arrays.items():
