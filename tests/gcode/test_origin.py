@@ -1,6 +1,7 @@
 """Who wrote a file: foreign ones get one sentence; a control is named by its marks, and read both ways."""
 
 import io
+import time
 
 import pytest
 
@@ -165,3 +166,12 @@ def test_a_refusal_about_meaning_names_no_other_dialect(tmp_path):
     (issue,) = refused(tmp_path, f"{MILL}G41 D1\nG1 X5 Y0 F500\nG1 X50\nG40 G1 X60\n{END}")
     assert issue.code == "cutter-entry"
     assert "--dialect" not in issue.remedy
+
+
+@pytest.mark.parametrize("line", ["(" + " " * 60 + ")", "", " " * 60, "O<" * 30, "N10 ", "; " + "-" * 60])
+def test_a_mark_is_looked_for_in_a_time_that_grows_with_the_text(line):
+    """Twice the text takes some twice the time, not its square or cube."""
+    text = (f"{line}\n" * 6000).encode()
+    begun = time.process_time()
+    assert control_of(text) is None
+    assert time.process_time() - begun < 2.0  # some hundredths; where blanks are passed in two ways, hours
