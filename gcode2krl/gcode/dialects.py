@@ -452,7 +452,7 @@ _SINUMERIK_STATEMENTS = {
         *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2"),
         *("DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
         *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
-        "FGREF",
+        *("FGREF", "SETMS"),
     ),
     _kind(d.TIP, 1): ("TRAORI",),
     _kind(d.TIP, 0): ("TRAFOOF",),

@@ -116,7 +116,8 @@ _FOREIGN: Final = (
         "this is a conversational program for a Heidenhain (BEGIN PGM, L X+10 R0 FMAX), not G-code",
         "read it with --dialect heidenhain",
         re.compile(
-            rb"\A[\s%]*(?:\d+\s*)?BEGIN\s+PGM\b|^[ \t]*(?:\d+[ \t]*)?(?:L|CC|C|CR)[ \t]+[XY][+-]\d.*\bR[0LR]\b",
+            rb"\A[\s%]*(?:\d+\s*)?BEGIN\s+PGM\b"
+            rb"|^[ \t]*(?:\d+[ \t]*)?(?:L|CC|C|CR)[ \t]+[XY][+-]\d.*\bR[0LR]\b",
             re.M,
         ),
         in_comments=True,
@@ -215,7 +216,16 @@ _FOREIGN: Final = (
         "not-a-part",
         "this is a KRL program, not G-code",
         "`gcode2krl verify` reads KRL; what is translated is the G-code",
-        re.compile(rb"\A(?:\s*&[A-Z][^\n]*\n)*\s*(?:DEF|DEFDAT|DEFFCT)\s+\w+", _FLAGS),
+        re.compile(rb"\A(?:\s*&[A-Z][^\n]*\n)*\s*(?:DEF\s+\w+\s*\(|DEFDAT\s+\w+|DEFFCT\s+\w+)", _FLAGS),
+        in_comments=True,
+    ),
+    _Foreign(
+        "not-a-part",
+        "this is a subprogram of a Sinumerik: PROC takes its numbers from the program that calls it",
+        "translate the program that calls it; the subprogram is read from beside that",
+        _pattern(
+            r"\A(?:[ \t\r]*(?:[%;][^\n]*)?\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*\([ \t]*[A-Z]"
+        ),
         in_comments=True,
     ),
     _Foreign(
@@ -223,7 +233,8 @@ _FOREIGN: Final = (
         "this is a cell file, not G-code",
         "give the program first and the cell by --cell: `gcode2krl part.nc --cell cell.toml`",
         re.compile(
-            rb"^[ \t]*(?:based_on|mounted_tool|verified)[ \t]*=|^[ \t]*\[(?:robot|controller|frames|cell|tool\.\d+|home)\]\s*$",
+            rb"^[ \t]*(?:based_on|mounted_tool|verified)[ \t]*="
+            rb"|^[ \t]*\[(?:robot|controller|frames|cell|tool\.\d+|home)\]\s*$",
             _FLAGS,
         ),
         in_comments=True,

@@ -275,9 +275,7 @@ class Program:
             number = own_number(file.name)
             self._define([Definition(number, first_word, is_program=True)])
 
-    def _look_at_siemens_lines(
-        self, text: bytes, first_row: int, word_of_row: Ints, first_word: int
-    ) -> None:
+    def _look_at_siemens_lines(self, text: bytes, first_row: int, word_of_row: Ints, first_word: int) -> None:
         file = self.files[-1]
         line_of_word = self._line.astype(np.int64)
         known = {name for names in self._spoken.statements.values() for name in names}

@@ -61,14 +61,17 @@ _CALL = re.compile(
 )
 _CASE = re.compile(_STATEMENT + rb"CASE\b(?P<value>[^;]*?)\bOF\b(?P<ways>[^;]*)", _FLAGS)
 _WAY = re.compile(
-    rb"[ \t]*(?:(?P<number>[-+]?\d+)|DEFAULT)[ \t]+GOTO(?P<way>[FBC]?)[ \t]+(?P<target>" + _NAME + rb"|N\d+)", _FLAGS
+    rb"[ \t]*(?:(?P<number>[-+]?\d+)|DEFAULT)[ \t]+GOTO(?P<way>[FBC]?)[ \t]+(?P<target>" + _NAME + rb"|N\d+)",
+    _FLAGS,
 )
 _HEADING = re.compile(
     rb"(?:[ \t\r]*(?:(?:N\d+[ \t]*)?(?:;[^\n]*)?|%[^\n]*)\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*"
     rb"(?:\((?P<formals>[^()\n]*)\))?(?P<attributes>[^;\n]*)",
     re.IGNORECASE,
 )
-_FORMAL = re.compile(rb"[ \t]*(?P<type>REAL|INT|BOOL)[ \t]+(?P<name>[A-Z_]{2}[A-Z0-9_]*)[ \t]*\Z", re.IGNORECASE)
+_FORMAL = re.compile(
+    rb"[ \t]*(?P<type>REAL|INT|BOOL)[ \t]+(?P<name>[A-Z_]{2}[A-Z0-9_]*)[ \t]*\Z", re.IGNORECASE
+)
 _DEFINED = re.compile(
     rb"^[ \t\r]*(?:/\d?)?[ \t]*(?:N\d+[ \t]*)?DEF[ \t]+(?P<type>REAL|INT|BOOL)\b(?P<names>[^;\n]*)",
     _FLAGS & ~re.DOTALL | re.MULTILINE,
@@ -139,7 +142,9 @@ def with_own_names(text: bytes, taken: Container[str]) -> bytes:
             for letters in product(ascii_uppercase, repeat=2)
             if (other := "".join(letters) + name[2:]) not in taken and other.encode() not in text.upper()
         )
-        text = re.sub(rb"(?<![A-Z0-9_])" + name.encode() + rb"(?![A-Z0-9_])", free.encode(), text, flags=re.IGNORECASE)
+        text = re.sub(
+            rb"(?<![A-Z0-9_])" + name.encode() + rb"(?![A-Z0-9_])", free.encode(), text, flags=re.IGNORECASE
+        )
     return text
 
 

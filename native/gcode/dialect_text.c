@@ -399,6 +399,8 @@ static int64_t statement_item(Scan *scan, Evaluation *e, int64_t i, int64_t line
     const int64_t end = after_name(scan->text, i);
     if ((AT(scan->text, i) & ~CH_CASE_BIT) == 'L' && end > i + 1 && is_digit(AT(scan->text, i + 1))) /* a subprogram */
         return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
+    if (AT(scan->text, i) == '_')
+        return statement(scan, e, i, end, line);
     if (end > i + 1 && (is_letter(AT(scan->text, i + 1)) || AT(scan->text, i + 1) == '_'))
         return statement(scan, e, i, end, line);
     return word_with_equals(scan, e, i, line);
@@ -434,7 +436,7 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
     const Bytes text = scan->text;
     const uint8_t c = AT(text, i);
     const int64_t syntax = scan->syntax;
-    if (is_letter(c)) {
+    if (is_letter(c) || (c == '_' && syntax & D_STATEMENTS)) {
         if (syntax & D_POINTS && lacks_point(text, i))
             put(scan, D_NEXT_POINTLESS, 0.0, line);
         return syntax & D_STATEMENTS ? statement_item(scan, e, i, line) : i;

@@ -29,6 +29,7 @@ FOREIGN = {
     "STL": "solid part\n facet normal 0 0 1\n  outer loop\n",
     "APT": "PARTNO/PLATE\nLOADTL/1\nFEDRAT/500,MMPM\nGOTO/1,2,3\nGOTO/4,5,6\nFINI\n",
     "HPGL": "IN;SP1;PU100,100;PD200,100;\n",
+    "subprogram": "%_N_SLOT_SPF\n; a slot\nN10 PROC SLOT(REAL LENGTH)\nG1 X=LENGTH\nRET\n",
     "KRL": "&ACCESS RVP\n&REL 1\nDEF PART()\nPTP HOME\nEND\n",
     "cell file": 'based_on = "demonstration"\n[tool.1]\ndiameter_mm = 6.0\n',
 }

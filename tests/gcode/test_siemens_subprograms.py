@@ -5,6 +5,7 @@ import pytest
 
 from gcode2krl import Gcode2KrlError, read_gcode
 from gcode2krl.gcode.dependencies import possible_files
+from tests.reference import controls
 
 HEAD = "G710 G90 G17 G94 G54\nG0 X0 Y0 Z5\nF100\n"
 
@@ -48,6 +49,8 @@ SLOT = "; a slot\nPROC SLOT(REAL LENGTH, INT TIMES, BOOL BACK)\nX=LENGTH Y=TIMES
 )
 def test_arguments_go_to_the_names_behind_proc_and_what_is_left_out_is_0(tmp_path, lines, expected):
     assert places(tmp_path, lines, SLOT=SLOT) == expected
+    again = controls.siemens(f"{HEAD}{lines.replace('TRUE', '1').replace('2.4', '2')}\nM30\n", {"SLOT": SLOT})
+    assert [list(place) for place in again[1:]] == expected
 
 
 def test_a_subprogram_is_run_as_often_as_p_says_and_shares_r_parameters(tmp_path):
@@ -66,7 +69,9 @@ def test_variables_belong_to_their_own_program(tmp_path):
 
 
 def test_labels_and_loops_of_a_subprogram_are_its_own(tmp_path):
-    sub = "R1=0\nNEXT: R1=R1+1\nX=R1\nIF R1<3 GOTOB NEXT\nREPEAT NEXT_A NEXT_E P=1\nRET\nNEXT_A: Y1\nNEXT_E: Y2"
+    sub = (
+        "R1=0\nNEXT: R1=R1+1\nX=R1\nIF R1<3 GOTOB NEXT\nREPEAT NEXT_A NEXT_E P=1\nRET\nNEXT_A: Y1\nNEXT_E: Y2"
+    )
     found = places(tmp_path, "GOTOF NEXT\nX77\nNEXT: SUB\nY9", SUB=sub)
     assert found == [[1, 0, 5], [2, 0, 5], [3, 0, 5], [3, 1, 5], [3, 2, 5], [3, 9, 5]]
 
@@ -95,7 +100,7 @@ def test_files_of_subprograms_are_told(tmp_path):
         ("X5 SUB", "RET", "dialect-statement", "subprograms"),
         ("SUB", "PROC SUB(VAR REAL WIDE)\nRET", "o-word", "by reference"),
         ("SUB", "PROC SUB SAVE\nRET", "o-word", "SAVE"),
-        ("SUB", 'PROC SUB(STRING[9] NAME)\nRET', "o-word", "REAL, INT or BOOL"),
+        ("SUB", "PROC SUB(STRING[9] NAME)\nRET", "o-word", "REAL, INT or BOOL"),
         ("SUB", "SUB\nRET", "o-word", "calls itself"),
         ("SUB", "X1\nM30", "o-word", "M17 or RET"),
         ("SUB", "X1 M17 Y3", "o-word", "the last word"),
@@ -133,7 +138,12 @@ def test_case_leads_to_the_label_of_its_value(tmp_path, value, x):
 def test_case_without_default_and_gotoc_without_a_label_go_on(tmp_path):
     assert places(tmp_path, "CASE (R1+3) OF 1 GOTOF ONE\nX5\nONE: Y5") == [[5, 0, 5], [5, 5, 5]]
     assert places(tmp_path, "GOTOC NOWHERE\nX5\nGOTOC LAST\nX6\nLAST: Y5") == [[5, 0, 5], [5, 5, 5]]
-    for line in ("CASE 1.5 OF 1 GOTOF ONE", "CASE 1 OF ONE", "CASE 1 OF 1 GOTOF ONE X3", "CASE 1 OF 1 GOTOF TWO"):
+    for line in (
+        "CASE 1.5 OF 1 GOTOF ONE",
+        "CASE 1 OF ONE",
+        "CASE 1 OF 1 GOTOF ONE X3",
+        "CASE 1 OF 1 GOTOF TWO",
+    ):
         assert refusals(tmp_path, f"{line}\nONE: X1")[0].code == "o-word", line
 
 
