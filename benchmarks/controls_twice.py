@@ -4,12 +4,14 @@
 marks of a
 Fanuc, a Sinumerik or a Heidenhain, reads it in that dialect for a cell that knows the tools T1 to T99,
 follows one
-remedy where it is refused, and compares the places with the other reading within 1e-6 mm. Printed is for each
+remedy where it is refused, and compares the places with the other reading within 1e-6 mm. Subprograms of a
+Sinumerik are looked for beside a program and in the other folders with such files. Printed is for each
 file: read, after one remedy, or not and why; and for those that are read: same, another place, or why they
 are
 not compared. The exit code is 1 where a place differs.
 """
 
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -22,17 +24,26 @@ from tests.reference import controls
 
 _TOOLS = {n: {"diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0} for n in range(1, 100)}
 _CUTTER = {"program": {"cutter": {"lead_in": "a", "d": "radius"}}}
-_FIRST, _REMEDIED = over_demonstration({"tool": _TOOLS}), over_demonstration({"tool": _TOOLS, **_CUTTER})
+_FIRST = over_demonstration({"tool": _TOOLS})
+_NAMED_TOOL = re.compile(r'\bT\s*=\s*"([^"]+)"|TOOL CALL "([^"]+)"')
 _OTHER_DIALECT = {"fanuc": "fanuc-calculator"}
 
 
-def reading(path, dialect):
+def remedied(path):
+    """Return a cell that states what refusals ask for: the cutter, and the names of the program's tools."""
+    names = dict.fromkeys(name for pair in _NAMED_TOOL.findall(text_of(path)) for name in pair if name)
+    tools = {n: {**_TOOLS[n], "name": name} for n, name in zip(range(99, 0, -1), names, strict=False)}
+    return over_demonstration({"tool": {**_TOOLS, **tools}, **_CUTTER})
+
+
+def reading(path, dialect, search):
     """Return how a program was read, the reading, and why not."""
-    attempts = (("read", _FIRST, dialect), ("one remedy", _REMEDIED, _OTHER_DIALECT.get(dialect, dialect)))
     why = ""
-    for how, cell, spoken in attempts:
+    for how in ("read", "one remedy"):
+        cell = _FIRST if how == "read" else remedied(path)
+        spoken = dialect if how == "read" else _OTHER_DIALECT.get(dialect, dialect)
         try:
-            return how, read_gcode(path, cell, dialect=spoken), ""
+            return how, read_gcode(path, cell, dialect=spoken, search=search), ""
         except Gcode2KrlError as error:
             first = next(issue for issue in error.issues if issue.severity == "error")
             why = f"line {first.line}: {first.message} [{first.code}]"
@@ -55,10 +66,17 @@ def places(toolpath):
     ]
 
 
-def compared(path, dialect, toolpath):
+def text_of(path):
+    """Return the text of a file."""
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def compared(path, dialect, toolpath, search):
     """Return what comparing a reading with the other one says."""
+    near = {p.stem.upper(): text_of(p) for folder in search for p in folder.glob("*.[sS][pP][fF]")}
+    beside = {"programs": near} if dialect == "sinumerik" else {}
     try:
-        theirs = controls.READERS[dialect](path.read_text(encoding="utf-8", errors="replace"))
+        theirs = controls.READERS[dialect](text_of(path), **beside)
     except controls.Unknown as unknown:
         return f"not compared ({str(unknown)[:40]})"
     except (KeyError, IndexError, TypeError, ValueError) as error:
@@ -71,13 +89,14 @@ def main():
     """Read, compare and print."""
     counts = Counter()
     for folder in sys.argv[1:]:
+        search = sorted({p.parent for p in Path(folder).rglob("*") if p.suffix.lower() == ".spf"})
         for path in sorted(p for p in Path(folder).rglob("*") if p.is_file()):
             mark = control_of(path.read_bytes()[:20000])
             dialect = mark.control.dialects[0] if mark is not None else ""
             if dialect not in controls.READERS:
                 continue
-            how, toolpath, why = reading(path, dialect)
-            said = compared(path, dialect, toolpath) if toolpath is not None else why
+            how, toolpath, why = reading(path, dialect, search)
+            said = compared(path, dialect, toolpath, search) if toolpath is not None else why
             counts[dialect, how] += 1
             counts[dialect, said.split(" ")[0] if toolpath is not None else "refused"] += 1
             print(f"{dialect:10} {how:10} {path.name}: {said}")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gcode2krl.files.program_names import PACKED_ENDING
+from gcode2krl.gcode.dialect_marks import PROGRAMS_FANUC, PROGRAMS_LINUXCNC
 from gcode2krl.gcode.o_words import Label
 from gcode2krl.gcode.subprograms import found_file
 
@@ -31,12 +32,16 @@ def possible_files(part: Path, folders: Sequence[Path]) -> tuple[Path, ...]:
     files: set[Path] = set()
     waiting = [part]
     while waiting:
-        labels = _labels_called(waiting.pop())
+        calling = waiting.pop()
+        of_sinumerik = _named_in(calling, places) - files - {part}
+        files |= of_sinumerik
+        waiting += of_sinumerik
+        labels = _labels_called(calling)
         if labels is None:
             return tuple(sorted(files | _all_files(places, part)))
         for label in sorted(labels):
-            for of_fanuc in (False, True):
-                file = found_file(label, places, part.suffix, of_fanuc=of_fanuc)
+            for programs in (PROGRAMS_LINUXCNC, PROGRAMS_FANUC):
+                file = found_file(label, places, part.suffix, programs)
                 if file is not None and file != part and file not in files:
                     files.add(file)
                     waiting.append(file)
@@ -47,6 +52,19 @@ def _all_files(places: Sequence[Path], part: Path) -> set[Path]:
     endings = {".ngc", ".nc", "", part.suffix.lower()}
     files = (file for place in places for file in place.glob("*") if file.suffix.lower() in endings)
     return {file for file in files if file.is_file() and file != part}
+
+
+def _named_in(file: Path, places: Sequence[Path]) -> set[Path]:
+    """Return the subprograms of a Sinumerik whose names stand in a file: a name alone is a call."""
+    found = (near for place in places for near in place.glob("*.[sSmM][pP][fF]") if near != file)
+    near = {each.stem.upper().encode(): each for each in found if each.is_file()}
+    if not near:
+        return set()
+    try:
+        words = set(re.findall(rb"\w+", file.read_bytes().upper()))
+    except OSError:  # reading it reports it
+        return set()
+    return {each for name, each in near.items() if name in words}
 
 
 def _labels_called(file: Path) -> set[Label] | None:

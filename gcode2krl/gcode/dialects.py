@@ -452,7 +452,7 @@ _SINUMERIK_STATEMENTS = {
         *("CFC", "CFTCP", "CFIN", "CUT2D", "CUT2DF", "CDOF", "CDON", "CDOF2"),
         *("DIAMOF", "SPOS", "GROUP_BEGIN", "GROUP_END", "EXTCALL_END", "FNORM", "FLIN", "RTLIOF"),
         *("RTLION", "WALIMON", "WALIMOF", "CTOL", "OTOL", "ATOL", "OST", "CPRECON", "CPRECOF", "SPOF"),
-        "FGREF",
+        *("FGREF", "SETMS"),
     ),
     _kind(d.TIP, 1): ("TRAORI",),
     _kind(d.TIP, 0): ("TRAFOOF",),
@@ -462,7 +462,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.SHIFT, 0): ("TRANS",),
     _kind(d.JUMP): (
         *("GOTO", "GOTOF", "GOTOB", "IF", "ELSE", "ENDIF", "LOOP", "ENDLOOP", "FOR", "ENDFOR", "WHILE"),
-        *("ENDWHILE", "REPEAT", "REPEATB", "UNTIL"),
+        *("ENDWHILE", "REPEAT", "REPEATB", "UNTIL", "CASE", "GOTOC"),
     ),
     _kind(d.DEFINE): ("DEF",),
     _kind(d.SHIFT, 1): ("ATRANS",),
@@ -487,7 +487,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.MODAL_CALL): ("MCALL",),
     _kind(d.REFUSED, _THREAD): ("CYCLE840",),
     _kind(d.REFUSED, _FLOW): (
-        *("GOTOC", "GOTOS", "CASE", "CALL", "EXTCALL", "WHEN"),
+        *("GOTOS", "CALL", "EXTCALL", "WHEN"),
         *("WHENEVER", "EVERY", "DO", "ID", "IDS", "SAVE"),
     ),
     _kind(d.REFUSED, _VECTORS): ("LEAD", "TILT", "THETA", "PSI"),

@@ -14,6 +14,8 @@ from gcode2krl.gcode.dialects import OTHER_POST
 
 FANUC_DIALECTS: Final = ("fanuc", "fanuc-calculator", "fanuc-increments")
 _HEAD_BYTES, _HEAD_LINES = 4000, 30
+# Comments are blanks where marks are looked for: blanks may be passed in one way only, or the time grows with
+# the square of a comment's length.
 _FLAGS = re.IGNORECASE | re.MULTILINE
 _COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 
@@ -62,7 +64,10 @@ def _pattern(*alternatives: str) -> re.Pattern[bytes]:
 _MARKS: Final = (
     (
         _HEIDENHAIN,
-        _pattern(r"^\s*\d*\s*BEGIN +PGM\b[^\n]*", r"^\s*\d*\s*(?:L|C|CR) +[XY][+-][\d.]+[^\n]*\bR[0LR]\b"),
+        _pattern(
+            r"^[ \t]*(?:\d+[ \t]*)?BEGIN +PGM\b[^\n]*",
+            r"^[ \t]*(?:\d+[ \t]*)?(?:L|C|CR) +[XY][+-][\d.]+[^\n]*\bR[0LR]\b",
+        ),
     ),
     (
         _SINUMERIK,
@@ -77,7 +82,7 @@ _MARKS: Final = (
     (
         _LINUXCNC,
         _pattern(
-            r"\bO *(?:<[^>\n]*>|\d+) *(?:sub|endsub|call|if|elseif|else|endif|while|endwhile|do|repeat)\b",
+            r"\bO *(?:<[^<>\n]*>|\d+) *(?:sub|endsub|call|if|elseif|else|endif|while|endwhile|do|repeat)\b",
             r"#<\w+>|\bG33\.1\b|\bG38\.[2-5]\b|\bG10 *L20\b",
         ),
     ),
@@ -93,7 +98,7 @@ _MARKS: Final = (
     ),
 )
 """What only one of the controls has, the surest first."""
-_HEAD_NUMBER = re.compile(rb"\A[\s%]*(?:[^\S\n]*\w*[^\S\n]*\n)?\s*([O:] *\d{1,8})[^\S\n]*$", _FLAGS)
+_HEAD_NUMBER = re.compile(rb"\A[\s%]*(?:\w+[^\S\n]*\n\s*)?([O:] *\d{1,8})[^\S\n]*$", _FLAGS)
 """A program number that stands alone, before anything else: O0001."""
 _POSTS: Final = (
     (_SINUMERIK, re.compile(rb"\b(?:sinumerik|siemens|840 ?D|828 ?D)\w*", _FLAGS)),
@@ -110,7 +115,11 @@ _FOREIGN: Final = (
         "dialect-unknown",
         "this is a conversational program for a Heidenhain (BEGIN PGM, L X+10 R0 FMAX), not G-code",
         "read it with --dialect heidenhain",
-        re.compile(rb"\A[\s%]*\d*\s*BEGIN\s+PGM\b|^\s*\d*\s*(?:L|CC|C|CR)\s+[XY][+-]\d.*\bR[0LR]\b", re.M),
+        re.compile(
+            rb"\A[\s%]*(?:\d+\s*)?BEGIN\s+PGM\b"
+            rb"|^[ \t]*(?:\d+[ \t]*)?(?:L|CC|C|CR)[ \t]+[XY][+-]\d.*\bR[0LR]\b",
+            re.M,
+        ),
         in_comments=True,
     ),
     _Foreign(
@@ -207,7 +216,16 @@ _FOREIGN: Final = (
         "not-a-part",
         "this is a KRL program, not G-code",
         "`gcode2krl verify` reads KRL; what is translated is the G-code",
-        re.compile(rb"\A(?:\s*&[A-Z][^\n]*\n)*\s*(?:DEF|DEFDAT|DEFFCT)\s+\w+", _FLAGS),
+        re.compile(rb"\A(?:\s*&[A-Z][^\n]*\n)*\s*(?:DEF\s+\w+\s*\(|DEFDAT\s+\w+|DEFFCT\s+\w+)", _FLAGS),
+        in_comments=True,
+    ),
+    _Foreign(
+        "not-a-part",
+        "this is a subprogram of a Sinumerik: PROC takes its numbers from the program that calls it",
+        "translate the program that calls it; the subprogram is read from beside that",
+        _pattern(
+            r"\A(?:[ \t\r]*(?:[%;][^\n]*)?\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*\([ \t]*[A-Z]"
+        ),
         in_comments=True,
     ),
     _Foreign(
@@ -215,7 +233,8 @@ _FOREIGN: Final = (
         "this is a cell file, not G-code",
         "give the program first and the cell by --cell: `gcode2krl part.nc --cell cell.toml`",
         re.compile(
-            rb"^\s*(?:based_on|mounted_tool|verified)\s*=|^\s*\[(?:robot|controller|frames|cell|tool\.\d+|home)\]\s*$",
+            rb"^[ \t]*(?:based_on|mounted_tool|verified)[ \t]*="
+            rb"|^[ \t]*\[(?:robot|controller|frames|cell|tool\.\d+|home)\]\s*$",
             _FLAGS,
         ),
         in_comments=True,

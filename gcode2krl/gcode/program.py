@@ -24,7 +24,7 @@ from gcode2krl.gcode.dialects import Dialect
 from gcode2krl.gcode.machine import MACHINE
 from gcode2krl.gcode.o_words import Definition, Flow, Label, parsed
 from gcode2krl.gcode.parameter_names import NAMES
-from gcode2krl.gcode.siemens_words import SiemensFlow, variables_of
+from gcode2krl.gcode.siemens_words import SiemensFlow, formals_of, variables_of, with_own_names
 from gcode2krl.gcode.state import STATE
 from gcode2krl.gcode.subprograms import found_file, own_number
 from gcode2krl.gcode.vocabulary import LINE_LIMIT, PROGRAM_LINE
@@ -186,7 +186,10 @@ class Program:
         text = text if text.endswith(b"\n") else text + b"\n"
         self.files.append(File(name, first_line, text, start_line))
         if self._spoken.programs == d.PROGRAMS_SINUMERIK:
-            self._spoken = replace(self._spoken, variables={**self._spoken.variables, **variables_of(text)})
+            taken = self._spoken.variables
+            if len(self.files) > 1:
+                text = with_own_names(text, taken)
+            self._spoken = replace(self._spoken, variables={**taken, **variables_of(text, taken)})
             self._program.statement_names, self._program.statement_kinds = self._spoken.names()
         scanned, lines = Scanner(self._spoken).scan_whole(text, first_line)
         self.most_decimals = max(self.most_decimals, scanned.most_decimals)
@@ -222,7 +225,7 @@ class Program:
         if self._is_macro:
             self._look_at_macro_lines(rows, word_of_row, words)
         elif self._spoken.programs == d.PROGRAMS_SINUMERIK:
-            self._look_at_siemens_lines(rows, word_of_row)
+            self._look_at_siemens_lines(text, rows, word_of_row, words)
         else:
             self._look_at_o_lines(rows, word_of_row)
         self._program.text = np.frombuffer(self._text, np.uint8)
@@ -272,10 +275,15 @@ class Program:
             number = own_number(file.name)
             self._define([Definition(number, first_word, is_program=True)])
 
-    def _look_at_siemens_lines(self, first_row: int, word_of_row: Ints) -> None:
+    def _look_at_siemens_lines(self, text: bytes, first_row: int, word_of_row: Ints, first_word: int) -> None:
         file = self.files[-1]
         line_of_word = self._line.astype(np.int64)
-        flow = SiemensFlow(file.text, file.first_line, line_of_word, self._lines, word_of_row)
+        known = {name for names in self._spoken.statements.values() for name in names}
+        known |= set(self._spoken.variables)
+        rows_of_labels = _LabelRows(self._labels)
+        flow = SiemensFlow(
+            text, file.first_line, line_of_word, self._lines, word_of_row, rows_of_labels, known
+        )
         for row in range(first_row, len(self._lines) - 1):
             start = int(self._lines["start"][row])
             content = self._text[start : self._text.index(b"\n", start)]
@@ -284,7 +292,25 @@ class Program:
             else:
                 flow.add(row, content)
         flow.finish()
-        self._tell_subprograms()
+        self._number_cases(flow.cases)
+        if len(self.files) == 1:
+            self._tell_subprograms()
+            return
+        label = Path(file.name).stem.lower()
+        self._define([Definition(label, first_word, is_program=True)])
+        formals = formals_of(text, self._spoken.variables)
+        called = self._subprograms[self._labels[label]]
+        called["fault"] = findings.PF.FAULT_FORMALS if formals is None else 0
+        called["formals"] = len(formals or ())
+        called["formal"][: len(formals or ())] = formals or ()
+
+    def _number_cases(self, cases: Sequence[tuple[int, int, int]]) -> None:
+        """Keep where the numbers of each CASE lead, in a segment of its own."""
+        rows = np.zeros(len(cases), tables.LABEL)
+        for case, (row, number, word) in zip(rows, cases, strict=True):
+            self._lines["segment"][row] = row
+            case["segment"], case["number"], case["word"] = row, number, word
+        self._numbered = self._program.labels = np.concatenate((self._numbered, rows))
 
     def _define(self, definitions: Iterable[Definition]) -> None:
         for definition in definitions:
@@ -378,7 +404,7 @@ class Program:
         if label in self._looked_for:
             return
         self._looked_for.add(label)
-        path = found_file(label, self._folders, Path(self.name).suffix, of_fanuc=self._is_macro)
+        path = found_file(label, self._folders, Path(self.name).suffix, self._spoken.programs)
         if path is not None:
             self.add(str(path), path.read_bytes(), 1, messages=0)
 

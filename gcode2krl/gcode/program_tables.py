@@ -28,6 +28,8 @@ MOST_R = 100
 """R0 to R99 are there on every Sinumerik; more are a setting of the machine."""
 FIRST_REAL, FIRST_INT, FIRST_BOOL = 100, 2000, 4000
 """Where the variables of a Sinumerik's program (DEF) stand among the parameters, by their type."""
+MOST_FORMALS = 33
+"""Parameters that a subprogram of a Sinumerik may have."""
 MACRO_LOCALS = 33
 """#1 to #33 are those of a macro on a Fanuc."""
 MACRO_COMMON, MACRO_KEPT, MACRO_END = (100, 199), (500, 999), 1000
@@ -69,7 +71,9 @@ ROOM_OF_LINE = 2 * (LINE_LIMIT + 1)
     KIND_ENDFOR,
     KIND_UNTIL,
     KIND_SECTION,
-) = range(26)
+    KIND_SIEMENS_CALL,
+    KIND_CASE,
+) = range(28)
 """What a marked line is: a block, an O-line that says nothing here, one that has not been looked at, …"""
 
 LINE = np.dtype(
@@ -98,6 +102,9 @@ SUBPROGRAM = np.dtype(
         ("missing_line", "i4"),  # of its first call that does not give one
         ("missing_read", "i4"),  # line that reads it
         ("missing_given", "i8"),  # bits of the arguments of that call
+        ("formal", "i4", MOST_FORMALS),  # parameters of the Sinumerik's variables that take its arguments
+        ("formals", "i4"),
+        ("fault", "i4"),  # FAULT_… for which it is not entered, 0 = none
     ],
     align=True,
 )
@@ -132,7 +139,7 @@ LABEL = np.dtype(
         ("loop_last", "i8"),
     ]
 )
-"""N and its number, for GOTO; sorted by segment, number and word."""
+"""N and its number, for GOTO, or a number of CASE in its line's segment; sorted by segment, number and word."""
 COURSE = np.dtype(
     [
         ("steps", "i8"),  # lines executed

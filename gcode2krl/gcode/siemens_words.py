@@ -1,4 +1,4 @@
-"""Statements of a Sinumerik: where its jumps lead, what ends what, which lines REPEAT repeats; variables.
+"""Statements of a Sinumerik: where jumps lead, what ends what, which lines are repeated or called; variables.
 
 All labels are written out, so all of it is known before the program runs. Blocks and loops are those of
 the O-words (`o_words`), under labels of their own.
@@ -6,6 +6,9 @@ the O-words (`o_words`), under labels of their own.
 
 import re
 from bisect import bisect_right
+from collections.abc import Container, Iterator, Mapping
+from itertools import product
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,7 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Ints
 from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
-from gcode2krl.gcode.o_words import Flow, OLine
+from gcode2krl.gcode.o_words import Flow, Label, OLine
 
 _FLAGS = re.IGNORECASE | re.DOTALL
 _NAME = rb"[A-Z_][A-Z0-9_]+"
@@ -26,7 +29,7 @@ _STATEMENT = _HEAD + rb"(?:" + _NAME + rb"[ \t]*:(?!=))?[ \t]*"
 _JUMP = re.compile(
     _STATEMENT
     + rb"(?:IF\b(?P<test>[^;]*?))?"
-    + rb"\bGOTO(?P<way>[FB]?)[ \t]+(?P<target>[A-Z_][A-Z0-9_]+|N\d+)"
+    + rb"\bGOTO(?P<way>[FBC]?)[ \t]+(?P<target>[A-Z_][A-Z0-9_]+|N\d+)"
     + _END,
     _FLAGS,
 )
@@ -50,6 +53,25 @@ _SECTION = re.compile(
     _FLAGS,
 )
 _ALONE = re.compile(_END, _FLAGS)
+_CALL = re.compile(
+    _STATEMENT
+    + rb"(?P<name>(?:[A-Z]|_)[A-Z]\w*\b|L\d+(?!\d))(?P<behind>[ \t]*(?:\([^;]*\))?[ \t]*(?:P[ \t]*=?[^;]*)?)"
+    + _END,
+    _FLAGS,
+)
+_CASE = re.compile(_STATEMENT + rb"CASE\b(?P<value>[^;]*?)\bOF\b(?P<ways>[^;]*)", _FLAGS)
+_WAY = re.compile(
+    rb"[ \t]*(?:(?P<number>[-+]?\d+)|DEFAULT)[ \t]+GOTO(?P<way>[FBC]?)[ \t]+(?P<target>" + _NAME + rb"|N\d+)",
+    _FLAGS,
+)
+_HEADING = re.compile(
+    rb"(?:[ \t\r]*(?:(?:N\d+[ \t]*)?(?:;[^\n]*)?|%[^\n]*)\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*"
+    rb"(?:\((?P<formals>[^()\n]*)\))?(?P<attributes>[^;\n]*)",
+    re.IGNORECASE,
+)
+_FORMAL = re.compile(
+    rb"[ \t]*(?P<type>REAL|INT|BOOL)[ \t]+(?P<name>[A-Z_]{2}[A-Z0-9_]*)[ \t]*\Z", re.IGNORECASE
+)
 _DEFINED = re.compile(
     rb"^[ \t\r]*(?:/\d?)?[ \t]*(?:N\d+[ \t]*)?DEF[ \t]+(?P<type>REAL|INT|BOOL)\b(?P<names>[^;\n]*)",
     _FLAGS & ~re.DOTALL | re.MULTILINE,
@@ -81,29 +103,84 @@ _OPENED_BY = {
 _WITH_EXPRESSION = ("if", "while", "for", "until")
 
 
-def variables_of(text: bytes) -> dict[str, int]:
-    """Return the numbers, as parameters, of the variables that a program defines, by names in capitals."""
+def variables_of(text: bytes, taken: Mapping[str, int]) -> dict[str, int]:
+    """Return the numbers, as parameters, of the variables that a file defines, by names in capitals.
+
+    ``taken`` are those of the files before.
+    """
     numbers: dict[str, int] = {}
-    free = {name: first for name, (first, _) in _ROOM.items()}
-    for found in _DEFINED.finditer(text):
-        of_type = found["type"].upper()
-        for part in found["names"].rstrip(b" \t\r").split(b","):
-            name = _VARIABLE.match(part)
-            if name is None or free[of_type] == _ROOM[of_type][1]:
-                continue
-            numbers.setdefault(name[1].upper().decode(), free[of_type])
+    free = {
+        of_type: max((n + 1 for n in taken.values() if first <= n < end), default=first)
+        for of_type, (first, end) in _ROOM.items()
+    }
+    for of_type, name in _names_defined(text):
+        if name not in numbers and free[of_type] < _ROOM[of_type][1]:
+            numbers[name] = free[of_type]
             free[of_type] += 1
     return numbers
+
+
+def _names_defined(text: bytes) -> Iterator[tuple[bytes, str]]:
+    """Yield type and name of each variable that PROC and DEF define."""
+    heading = _HEADING.match(text)
+    for part in (heading["formals"] or b"").split(b",") if heading is not None else ():
+        formal = _FORMAL.match(part)
+        if formal is not None:
+            yield formal["type"].upper(), formal["name"].upper().decode()
+    for found in _DEFINED.finditer(text):
+        for part in found["names"].rstrip(b" \t\r").split(b","):
+            name = _VARIABLE.match(part)
+            if name is not None:
+                yield found["type"].upper(), name[1].upper().decode()
+
+
+def with_own_names(text: bytes, taken: Container[str]) -> bytes:
+    """Return a subprogram whose variables have names that no file before has, each as long as it was."""
+    for name in dict.fromkeys(name for _, name in _names_defined(text) if name in taken):
+        free = next(
+            other
+            for letters in product(ascii_uppercase, repeat=2)
+            if (other := "".join(letters) + name[2:]) not in taken and other.encode() not in text.upper()
+        )
+        text = re.sub(
+            rb"(?<![A-Z0-9_])" + name.encode() + rb"(?![A-Z0-9_])", free.encode(), text, flags=re.IGNORECASE
+        )
+    return text
+
+
+def formals_of(text: bytes, variables: Mapping[str, int]) -> list[int] | None:
+    """Return the parameters that take a subprogram's arguments, None where one of them is not read."""
+    heading = _HEADING.match(text)
+    if heading is None:
+        return []
+    if re.search(rb"\bSAVE\b", heading["attributes"], _FLAGS):
+        return None
+    parts = heading["formals"].split(b",") if (heading["formals"] or b"").strip() else []
+    formals = [_FORMAL.match(part) for part in parts]
+    names = [formal["name"].upper().decode() for formal in formals if formal is not None]
+    if len(names) < len(parts) or len(names) > tables.MOST_FORMALS or len(set(names)) < len(names):
+        return None
+    return [variables[name] for name in names]
 
 
 class SiemensFlow:
     """Fills in the jumps, blocks and loops of one file."""
 
     def __init__(
-        self, text: bytes, first_line: int, line_of_word: Ints, lines: NDArray[Any], word_of_row: Ints
+        self,
+        text: bytes,
+        first_line: int,
+        line_of_word: Ints,
+        lines: NDArray[Any],
+        word_of_row: Ints,
+        rows_of_labels: Mapping[Label, int],
+        known: Container[str],
     ) -> None:
-        """Take the text of a program from its first line on, the line of each of its words, and its marked
-        lines."""
+        """Take the text of a file from its first line on, the line of each word of the program, its marked
+        lines, the rows of subprograms by label, and the names in capitals that are none of subprograms."""
+        self._rows_of_labels, self._known = rows_of_labels, known
+        self.cases: list[tuple[int, int, int]] = []
+        """Row of each CASE, a number of it, and the word to which that leads."""
         self._lines, self._word_of_row, self._line_of_word = lines, word_of_row, line_of_word
         self._flow = Flow(lines, word_of_row, {})
         self._open: list[tuple[str, int]] = []
@@ -135,6 +212,12 @@ class SiemensFlow:
             self._section(row, section)
         elif (block := _BLOCK.match(content)) is not None:
             self._block(row, block["word"].decode().lower(), block.end(), content)
+        elif (case := _CASE.match(content)) is not None:
+            self._case(row, case)
+        elif (call := _CALL.match(content)) is not None and call["name"].upper().decode() not in self._known:
+            self._lines["kind"][row] = tables.KIND_SIEMENS_CALL
+            self._lines["subprogram"][row] = self._rows_of_labels[call["name"].lower().decode()]
+            self._lines["expression"][row] = self._lines["start"][row] + call.start("behind")
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
@@ -151,7 +234,10 @@ class SiemensFlow:
     def _jump(self, row: int, found: re.Match[bytes]) -> None:
         target = self._target(found["target"].upper(), found["way"].upper(), int(self._word_of_row[row]))
         if target is None:
-            self._fault(row, findings.PF.FAULT_NO_LABEL)
+            if found["way"].upper() != b"C":  # GOTOC goes on where there is no such label
+                self._fault(row, findings.PF.FAULT_NO_LABEL)
+            else:
+                self._lines["kind"][row] = tables.KIND_NOTHING
             return
         self._lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
         self._lines["target"][row] = target
@@ -166,6 +252,23 @@ class SiemensFlow:
         if way != b"B" and split < len(known):
             return known[split]
         return known[split - 1] if way != b"F" and split else None
+
+    def _case(self, row: int, found: re.Match[bytes]) -> None:
+        at, word = found.start("ways"), int(self._word_of_row[row])
+        self._lines["kind"][row] = tables.KIND_CASE
+        self._lines["expression"][row] = self._lines["start"][row] + found.start("value")
+        while (way := _WAY.match(found.string, at, found.end("ways"))) is not None:
+            at = way.end()
+            target = self._target(way["target"].upper(), way["way"].upper(), word)
+            if target is None:
+                self._fault(row, findings.PF.FAULT_NO_LABEL)
+                return
+            if way["number"] is not None:
+                self.cases.append((row, int(way["number"]), target))
+            else:
+                self._lines["target"][row] = target
+        if at == found.start("ways") or found.string[at : found.end("ways")].strip():
+            self._fault(row, findings.PF.FAULT_CASE)
 
     def _fault(self, row: int, fault: int) -> None:
         self._lines["kind"][row], self._lines["fault"][row] = tables.KIND_FAULT, fault

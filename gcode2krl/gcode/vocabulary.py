@@ -62,7 +62,7 @@ G90_1, G91_1 = 901, 911  # absolute, incremental centres of arcs
 G92, G92_1, G92_2, G92_3 = 920, 921, 922, 923  # coordinate shift: set, clear, suspend, restore
 G98, G99 = 980, 990  # retract of a canned cycle to where it began; to R
 
-M0, M1, M2, M30, M60 = 0, 1, 2, 30, 60  # stop, optional stop, end, end, pallet change
+M0, M1, M2, M17, M30, M60 = 0, 1, 2, 17, 30, 60  # stop, optional stop, end, end (Sinumerik), end, pallet
 M3, M4, M5 = 3, 4, 5  # spindle clockwise, counter-clockwise, off
 M6 = 6  # tool change
 M7, M9 = 7, 9  # mist, both off; M8 between them is flood

@@ -316,7 +316,7 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
             return refuse(scan, e, i, line, DR_REASON_MESSAGE);
         return message(scan, end, line);
     case D_CODE: put(scan, 'G', kind / D_KIND_STEP, line); return end;
-    case D_ENDS: put(scan, 'M', V_M30, line); return end;
+    case D_ENDS: put(scan, 'M', V_M17, line); return end;
     case D_TIP:
         put(scan, kind / D_KIND_STEP == 0 ? D_TIP_OFF : is_first_one(text, end) ? D_TIP_ON : D_OTHER_TIP, 0.0, line);
         return after_harmless(text, end);
@@ -347,7 +347,7 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
         put(scan, D_LABEL, 0.0, line);
         return behind + 1;
     }
-    return refuse(scan, e, i, line, DR_REASON_FLOW);
+    return e == NULL && kind < 0 ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW); /* a subprogram's name? */
 }
 
 /* Write the tool whose name opens at i, T="MILL10". */
@@ -397,6 +397,10 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
 /* Return the place behind a statement or a word with =, i where the letter at i begins a plain word. */
 static int64_t statement_item(Scan *scan, Evaluation *e, int64_t i, int64_t line) {
     const int64_t end = after_name(scan->text, i);
+    if ((AT(scan->text, i) & ~CH_CASE_BIT) == 'L' && end > i + 1 && is_digit(AT(scan->text, i + 1))) /* a subprogram */
+        return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
+    if (AT(scan->text, i) == '_')
+        return statement(scan, e, i, end, line);
     if (end > i + 1 && (is_letter(AT(scan->text, i + 1)) || AT(scan->text, i + 1) == '_'))
         return statement(scan, e, i, end, line);
     return word_with_equals(scan, e, i, line);
@@ -432,7 +436,7 @@ int64_t dialect_item(Scan *scan, Evaluation *e, int64_t i, int64_t line, bool fi
     const Bytes text = scan->text;
     const uint8_t c = AT(text, i);
     const int64_t syntax = scan->syntax;
-    if (is_letter(c)) {
+    if (is_letter(c) || (c == '_' && syntax & D_STATEMENTS)) {
         if (syntax & D_POINTS && lacks_point(text, i))
             put(scan, D_NEXT_POINTLESS, 0.0, line);
         return syntax & D_STATEMENTS ? statement_item(scan, e, i, line) : i;

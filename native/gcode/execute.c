@@ -8,6 +8,7 @@
 #include "gcode/macro_flow.h"
 #include "gcode/machine.h"
 #include "gcode/program_line.h"
+#include "gcode/siemens_flow.h"
 
 /* Execute a block whose words are known; return the word at which to go on. */
 static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t to, int64_t next) {
@@ -16,6 +17,8 @@ static int64_t known_block(Run *run, const Words *words, int64_t from, int64_t t
         return next;
     if (run->program->language == D_PROGRAMS_FANUC)
         return macro_block(run, words, from + deletable, to, next);
+    if (run->program->language == D_PROGRAMS_SINUMERIK)
+        return siemens_block(run, words, from + deletable, to, next);
     if (run->program->language == D_PROGRAMS_LINUXCNC && from + deletable < to && AT(words->letter, from + deletable) == 'M') {
         const double m = AT(words->value, from + deletable);
         if (m == V_M98)

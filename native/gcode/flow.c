@@ -434,6 +434,8 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_FOR: return begin_counting(run, marked, next);
     case P_KIND_ENDFOR: return count_on(run, marked, next);
     case P_KIND_SECTION: return repeat_section(run, marked, next);
+    case P_KIND_SIEMENS_CALL: return call_by_name(run, marked, next);
+    case P_KIND_CASE: return select_case(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

@@ -74,7 +74,9 @@ static bool are_modes_plain(const Block *b) {
    sure. */
 static double depth_below(const Block *b, int absolute, int relative, int digit) {
     const double by_absolute = or_zero(b, RFP) - or_zero(b, absolute), by_relative = or_zero(b, relative);
-    const bool a = is_stated(b, absolute), r = is_stated(b, relative);
+    const bool both = digit == BY_ARGUMENTS && is_stated(b, absolute) && is_stated(b, relative);
+    const bool r = is_stated(b, relative) && !(both && by_relative == 0.0); /* 0 is what is left out */
+    const bool a = is_stated(b, absolute) && !(both && r && by_absolute == 0.0);
     if (digit > ABSOLUTE || !(digit == ABSOLUTE ? a : digit == INCREMENTAL ? r : a || r))
         return NAN;
     if (digit == BY_ARGUMENTS && a && r && fabs(by_absolute - by_relative) > SAME_DEPTH)

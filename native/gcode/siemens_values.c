@@ -402,8 +402,8 @@ int64_t loop_head(Evaluation *e, int64_t i, double *first, double *last) {
     return number;
 }
 
-/* Set the variable of a loop, and tell its value. */
-double set_counter(Evaluation *e, int64_t number, double value) {
+/* Give a variable a value, once the line is read, and tell it as the variable holds it. */
+double set_variable(Evaluation *e, int64_t number, double value) {
     keep(e, number, value, 0);
     return of_type(number, value);
 }

@@ -9,7 +9,7 @@ double siemens_value(Evaluation *e, int64_t *i);
 int64_t assign_variable(Evaluation *e, int64_t number, int64_t place, int64_t value);
 int64_t define_variables(Evaluation *e, int64_t i);
 int64_t loop_head(Evaluation *e, int64_t i, double *first, double *last);
-double set_counter(Evaluation *e, int64_t number, double value);
+double set_variable(Evaluation *e, int64_t number, double value);
 bool siemens_line_ends(Evaluation *e, int64_t i);
 int64_t assign_r(Evaluation *e, int64_t place, int64_t behind, int64_t value);
 

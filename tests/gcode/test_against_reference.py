@@ -43,6 +43,12 @@ PROGRAMS = [
     ("sinumerik", "G91\nST: X1\nY1\nEN: X2\nREPEAT ST EN P=2\nREPEAT EN P=1\nM30"),
     ("sinumerik", "LOOP\nR1=R1+1\nX=R1\nIF R1==5 GOTOF OU\nENDLOOP\nOU: SUPA G0 Z0\nX1 Y1 Z1\nM30"),
     ("sinumerik", "CYCLE83(10,0,2,-20,,,8,2,0,0,0.5,1)\nG2 X10 Y0 CR=5\nG3 X20 Y0 I5 J0 TURN=1\nM30"),
+    (
+        "sinumerik",
+        "R1=1\nAG: CASE R1 OF 1 GOTOF ONE 3 GOTOF TWO DEFAULT GOTOF OT\nONE: X1\nTWO: X2\nOT: R1=R1+1\n"
+        "X=R1*10\n"
+        "IF R1<4 GOTOB AG\nMCALL CYCLE81(10,0,2,-5,0)\nX1\nMCALL CYCLE82(10,0,2,0,4,0)\nX2\nMCALL\nM30",
+    ),
     ("heidenhain", "3 CC X+10 Y+0\n4 C X+20 Y+0 DR- F100\n5 L IX+5 IZ-2\n6 CR X+30 Y+5 R+5 DR+\n7 L M30"),
     (
         "heidenhain",

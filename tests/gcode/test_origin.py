@@ -1,6 +1,7 @@
 """Who wrote a file: foreign ones get one sentence; a control is named by its marks, and read both ways."""
 
 import io
+import time
 
 import pytest
 
@@ -28,6 +29,7 @@ FOREIGN = {
     "STL": "solid part\n facet normal 0 0 1\n  outer loop\n",
     "APT": "PARTNO/PLATE\nLOADTL/1\nFEDRAT/500,MMPM\nGOTO/1,2,3\nGOTO/4,5,6\nFINI\n",
     "HPGL": "IN;SP1;PU100,100;PD200,100;\n",
+    "subprogram": "%_N_SLOT_SPF\n; a slot\nN10 PROC SLOT(REAL LENGTH)\nG1 X=LENGTH\nRET\n",
     "KRL": "&ACCESS RVP\n&REL 1\nDEF PART()\nPTP HOME\nEND\n",
     "cell file": 'based_on = "demonstration"\n[tool.1]\ndiameter_mm = 6.0\n',
 }
@@ -165,3 +167,12 @@ def test_a_refusal_about_meaning_names_no_other_dialect(tmp_path):
     (issue,) = refused(tmp_path, f"{MILL}G41 D1\nG1 X5 Y0 F500\nG1 X50\nG40 G1 X60\n{END}")
     assert issue.code == "cutter-entry"
     assert "--dialect" not in issue.remedy
+
+
+@pytest.mark.parametrize("line", ["(" + " " * 60 + ")", "", " " * 60, "O<" * 30, "N10 ", "; " + "-" * 60])
+def test_a_mark_is_looked_for_in_a_time_that_grows_with_the_text(line):
+    """Twice the text takes some twice the time, not its square or cube."""
+    text = (f"{line}\n" * 6000).encode()
+    begun = time.process_time()
+    assert control_of(text) is None
+    assert time.process_time() - begun < 2.0  # some hundredths; where blanks are passed in two ways, hours

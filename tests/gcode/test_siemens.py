@@ -162,7 +162,6 @@ def test_blocks_loops_and_sections(lines, xs):
         ("R1=1\nIF R1==1 X5\nENDIF", "expression", 2),
         ("R1=2\nIF R1 AND 1\nENDIF", "expression", 2),
         ("WHILE R1<5\nENDWHILE", "endless-loop", 2),
-        ("CASE R1 OF 1 GOTOF AB\nAB:", "dialect-statement", 1),
     ],
 )
 def test_what_leads_nowhere_sure_is_refused(lines, code, line):

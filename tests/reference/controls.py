@@ -198,20 +198,56 @@ def _value(text, variables):
         raise Unknown(text) from error
 
 
-_BRACKET = r"\((?:[^()]|\([^()]*\))*\)"
-_ADDRESS = re.compile(
-    rf"([A-Z]+\d*)\s*=\s*((?:AC|IC)?{_BRACKET}|(?:[^\s();]|\([^()]*\))+)"
-    r"|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))"
-)
+_BRACKET = r"\([^()]*\)"
+for _ in range(3):  # brackets within brackets
+    _BRACKET = rf"\((?:[^()]|{_BRACKET})*\)"
+_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _SAID = (
     r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|NORM|CYCLE832\s*\([^)]*\)"
     r"|G64[0-9]*|ADIS\s*=\S+)"
 )
 
 
-def siemens(text):
-    """Return the places of a program for a Sinumerik 840D."""
+def siemens(text, programs=None):
+    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name."""
+    run, variables = _Machine(), {f"R{n}": 0.0 for n in range(100)}
+    _siemens_program(text, run, variables, {"g": 0, "modal": None}, programs or {}, 0)
+    return run.places
+
+
+def _siemens_call(line, run, variables, state, programs, depth):
+    """Run a subprogram that a line calls; return whether it is such a line."""
+    m = re.match(r"([A-Z_]{2}\w*|L\d+)\s*(?:\((.*)\))?\s*(?:P\s*=?\s*(\d+))?$", line)
+    if m is None or m[1] not in programs:
+        return False
+    if depth > 8:
+        raise Unknown("calls")
+    heading = re.search(r"^\s*(?:N\d+)?\s*PROC\s+\w+\s*\(([^)]*)\)", programs[m[1]], re.MULTILINE | re.I)
+    formals = [part.split()[-1].upper() for part in heading[1].split(",")] if heading else []
+    given = [_value(part, variables) if part.strip() else 0.0 for part in (m[2] or "").split(",")]
+    for _ in range(int(m[3] or 1)):
+        inner = {name: value for name, value in variables.items() if re.fullmatch(r"R\d+", name)}
+        shared = list(inner)
+        inner.update(dict(zip(formals, given + [0.0] * len(formals), strict=False)))
+        _siemens_program(programs[m[1]], run, inner, state, programs, depth + 1)
+        variables.update({name: inner[name] for name in shared})
+    return True
+
+
+def _siemens_case(line, variables, labels):
+    """Return where a CASE leads, None where it goes on."""
+    m = re.match(r"CASE\b(.*?)\bOF\b(.*)$", line)
+    value = _value(m[1], variables)
+    for number, default, label in re.findall(r"(?:(-?\d+)|(DEFAULT))\s+GOTO[FB]?\s+(\w+)", m[2]):
+        if default or float(number) == value:
+            return labels[label]
+    return None
+
+
+def _siemens_program(text, run, variables, state, programs, depth):
     lines = [line.split(";")[0].upper().strip() for line in text.splitlines()]
+    lines = [re.sub(r"\s*([=+*/<>,-])\s*|(?<=\()\s+|\s+(?=\))", r"\1", line) for line in lines]
+    lines = [re.sub(r"\)(?=[A-Z])", ") ", line) for line in lines]
     lines = [re.sub(r"^/?\s*N\d+\s*", "", line) for line in lines]
     labels, codes = {}, []
     for k, line in enumerate(lines):
@@ -220,7 +256,6 @@ def siemens(text):
             labels[found[1]] = k
         codes.append(line[found.end() :] if found else line)
     pairs = _blocks(codes)
-    run, variables, state = _Machine(), {f"R{n}": 0.0 for n in range(100)}, {"g": 0, "modal": None}
     k, stack, steps = 0, [], 0
     while k < len(codes):
         steps += 1
@@ -256,11 +291,14 @@ def siemens(text):
             if times:
                 stack.append([labels[m[1]], end, times - 1, k])
                 k = labels[m[1]]
-        elif re.match(r"(ENDIF|LOOP|REPEAT)$", line):
+        elif line.startswith("CASE"):
+            k = _siemens_case(line, variables, labels) or k
+        elif re.match(r"(ENDIF|LOOP|REPEAT|PROC .*|EXTERN.*)$", line) or _siemens_call(
+            line, run, variables, state, programs, depth
+        ):
             continue
-        elif _siemens_block(line, run, variables, state):
+        elif line == "RET" or _siemens_block(line, run, variables, state):
             break
-    return run.places
 
 
 def _blocks(codes):
@@ -281,7 +319,7 @@ def _blocks(codes):
 
 def _siemens_block(line, run, variables, state):
     """Carry out one block; return whether the program ends."""
-    if (m := re.match(r"DEF\s+(?:REAL|INT)\s+(.*)$", line)) is not None:
+    if (m := re.match(r"DEF\s+(?:REAL|INT|BOOL)\s+(.*)$", line)) is not None:
         for part in m[1].split(","):
             name, _, value = part.partition("=")
             variables[name.strip()] = _value(value, variables) if value else 0.0
@@ -342,9 +380,9 @@ def _siemens_hole(cycle, variables):
     given = [_value(part, variables) if part.strip() else None for part in cycle[2].split(",")]
     given += [None] * 8
     rtp, rfp, sdis, dp, dpr = given[:5]
-    if dp is not None and dpr is not None:
+    if dp is not None and dpr and dp != rfp:
         raise Unknown("two depths")
-    return rfp + (sdis or 0.0), dp if dp is not None else rfp - dpr, rtp
+    return rfp + (sdis or 0.0), rfp - dpr if dpr else dp, rtp
 
 
 def heidenhain(text):
