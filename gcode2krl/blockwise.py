@@ -268,7 +268,10 @@ class Loads:
         self._arm: ArmInStock | None = None
         self._skipped: tuple[Issue, ...] = ()
         self._missing = compliance.missing_stiffness(cell)
-        self._force_limits, self._deflection_limit = ForceLimits(cell), DeflectionLimit(cell)
+        self._force_limits, self._deflection_limit = (
+            ForceLimits(cell),
+            DeflectionLimit(cell, "" if self._missing is not None else compliance.stiffness(cell).assumed),
+        )
         self._cuts = np.zeros(len(toolpath), dtype=np.bool_)
         self._waiting: tuple[Motion, Floats, Floats] | None = None
         self.count = 0
@@ -351,7 +354,8 @@ class Loads:
             return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
         if bent.absurd is not None:
             return Outcome(force_issues, None, (bent.absurd,))
-        return Outcome(force_issues, tuple(bent.issues()), ())
+        assumed = compliance.assumed_stiffness(self._cell, "note")
+        return Outcome(force_issues, (*bent.issues(), *([assumed] if assumed is not None else ())), ())
 
 
 class PilotSamples:

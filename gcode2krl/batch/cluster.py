@@ -44,7 +44,7 @@ def pack(task: Task) -> Shipment:
     order = task.order
     cell = None if order.cell_path is None else str(order.cell_path)
     job = None if order.job_path is None else str(order.job_path)
-    files = [Path(file).absolute() for file in (*cell_files(cell), *files_of_job(job))]
+    files = [Path(file).absolute() for file in (*cell_files(cell), *files_of_job(job, order.tools_path))]
     files += [file.absolute() for file in subprogram_files(order.part, order.search)]
     part = Path(order.part).absolute()
     search = [Path(folder).absolute() for folder in order.search]
@@ -55,7 +55,12 @@ def pack(task: Task) -> Shipment:
         raise input_error("cluster", "its files are on several drives", remedy, source=str(part)) from None
     moved: dict[str, Any] = {
         name: None if path is None else _below(Path(path).absolute(), origin)
-        for name, path in (("part", part), ("cell_path", cell), ("job_path", job))
+        for name, path in (
+            ("part", part),
+            ("cell_path", cell),
+            ("job_path", job),
+            ("tools_path", order.tools_path),
+        )
     }
     moved["search"] = tuple(_below(folder, origin) for folder in search)
     contents = {_below(file, origin): file.read_bytes() for file in {part, *files} if file.is_file()}
@@ -75,6 +80,7 @@ def make_shipped(shipment: Shipment) -> Made:
             "part": place / order.part,
             "cell_path": None if order.cell_path is None else place / order.cell_path,
             "job_path": None if order.job_path is None else place / order.job_path,
+            "tools_path": None if order.tools_path is None else place / order.tools_path,
             "search": tuple(str(place / folder) for folder in order.search),
         }
         for folder in moved["search"]:

@@ -33,7 +33,7 @@ from gcode2krl.translation.inputs import (
 from gcode2krl.translation.project import project_of
 from gcode2krl.version import __version__
 
-_PLACES = ("report", "job_path", "search")
+_PLACES = ("report", "job_path", "tools_path", "search")
 """Options that say where something is; for a key counts what it is."""
 
 
@@ -120,7 +120,8 @@ def _planned(part: BatchPart, cell: _Cell, own: Order, page: str) -> Planned:
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
     key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 and cell.sha256 else ""
-    inputs = (part.file, *cell.files, *(subprogram_files(own.part, own.search) if sha256 else ()))
+    subprograms = subprogram_files(own.part, own.search) if sha256 else ()
+    inputs = (part.file, *cell.files, *files_of_job(None, own.tools_path), *subprograms)
     return Planned(part, Task(own, page), inputs, size_bytes, sha256, cell.sha256, key)
 
 
@@ -138,6 +139,8 @@ def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:
     if order.job_path is not None:
         job = Path(order.job_path)
         yield "job", (job.name, hashlib.sha256(job.read_bytes()).hexdigest())
+    if order.tools_path is not None and Path(order.tools_path).is_file():
+        yield "tools", (Path(order.tools_path).name, sha256_of(Path(order.tools_path)))
 
 
 # where programs go ------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ the controller) stays with the cell: a tool that the cell does not have is not a
 it is refused. That is why a confirmed cell stays confirmed under a job.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -15,8 +15,9 @@ from gcode2krl.cell import library
 from gcode2krl.cell.contradictions import contradictory
 from gcode2krl.cell.definition import Cell
 from gcode2krl.cell.ranges import range_issues
-from gcode2krl.cell.sections import Section, Stock, Tool, ToolNumber
+from gcode2krl.cell.sections import Section, Stock, Tool, ToolNumber, Unconfirmed
 from gcode2krl.cell.sections.fields import Finite, NotNegative, Positive
+from gcode2krl.cell.tool_files import read_tools, sections_of
 from gcode2krl.errors import Issue, NotUnderstoodError
 
 _Model = TypeVar("_Model", bound=Section)
@@ -102,6 +103,51 @@ def lay_job_over(cell: Cell, path: Path) -> UnderJob:
     if wrong:
         raise NotUnderstoodError(wrong, source)
     return UnderJob(under, (*issues, *doubts))
+
+
+def with_tools(cell: Cell, path: Path) -> UnderJob:
+    """Return the cell with the tools of a library that it does not have, and what a person should know.
+
+    Only tools whose length from the spindle's gauge line the library states are added; none of them is
+    confirmed. A tool that the cell has stays as it is.
+
+    Raises `NotUnderstoodError` where the file is no library, or a tool of it cannot be.
+    """
+    sections, left_out = sections_of(read_tools(path), {}, path.name)
+    tools, added = dict(cell.tool), []
+    issues: list[Issue] = []
+    for number, keys in sections.items():
+        if number in cell.tool:
+            issues += differences(number, cell.tool[number], keys)
+        elif "length_mm" in keys:
+            tools[number] = _checked(Tool, keys, f"tool.{number}.", str(path))
+            added.append(number)
+    under = cell.under(tool=tools)
+    wrong = [issue for issue in range_issues(under, set(added)) if issue.severity == "error"]
+    if wrong:
+        raise NotUnderstoodError(wrong, str(path))
+    if left_out:
+        sentence = f"{path.name}: {len(left_out)} tools are not taken, or have no length"
+        remedy = f"`gcode2krl tools import {path.name}` says which, and why"
+        issues.append(Issue("note", "tool-file", 0, sentence, remedy))
+    if added:
+        names = ", ".join(f"T{number}" for number in added)
+        sentence = f"{names} from {path.name}: length and cutter are those of the CAM system, not confirmed"
+        remedy = f"`gcode2krl tools import {path.name} --cell CELL.toml` keeps them; measure the lengths"
+        issues.append(Issue("warning", "tool-file", 0, sentence, remedy))
+        if under.unconfirmed is not None:
+            new = (Unconfirmed(key=f"tool.{number}", kind="unsigned") for number in added)
+            under = under.model_copy(update={"unconfirmed": (*under.unconfirmed, *new)})
+    return UnderJob(under, tuple(issues))
+
+
+def differences(number: int, own: Tool, keys: Mapping[str, Any]) -> Iterator[Issue]:
+    """Yield a finding where a library's tool is another cutter than the cell's, which stays."""
+    wrong = [key for key in SHAPE if key in keys and differs(getattr(own, key), keys[key])]
+    if wrong:
+        words = ", ".join(f"{key} {keys[key]} and {getattr(own, key)} in the cell" for key in wrong)
+        remedy = f"correct [tool.{number}] of the cell, or renumber the tool in the CAM system"
+        yield Issue("warning", "tool-differs", 0, f"T{number}: {words}; the cell's stays", remedy)
 
 
 def job_files(path: Path) -> list[Path]:

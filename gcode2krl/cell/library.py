@@ -4,6 +4,7 @@ import contextlib
 import copy
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ _PLAIN_MODEL = re.compile(r'model = "([^"\\\x00-\x1f\x7f\ufffd]*)"\n')
 _LONGEST_LINE = 1000
 _AT_LINE = re.compile(r"at line (\d{1,9}), (?=column \d+\)$)")
 """How `tomllib` says where it stopped."""
+_REACH = re.compile(r"\bR\s*(\d{3,4})")
+_PAYLOAD = re.compile(r"\bKR\s*(\d+)")
+"""Numbers in a robot's name."""
 KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
@@ -127,15 +131,47 @@ def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, A
     by_folded_name = {_fold(name): file for name, file in known.items()}
     file = by_folded_name.get(_fold(model))
     if file is None:
-        import difflib
+        if kind == "robots":
+            remedy = robot_meant(model, list(known))
+        else:
+            import difflib
 
-        near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
-        meant = [name for name in known if _fold(name) in near]
-        remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"
+            near = difflib.get_close_matches(_fold(model), by_folded_name, n=1, cutoff=0.0)
+            meant = [name for name in known if _fold(name) in near]
+            remedy = f"did you mean {meant[0]!r}?" if meant else "see the library"
         raise input_error(
             "model-unknown", f"{kind[:-1]}.model: found {model[:60]!r}, allowed: {', '.join(known)}", remedy
         )
     return copy.deepcopy(_of_library(file))
+
+
+def robot_meant(model: str, known: Sequence[str]) -> str:
+    """Return the remedy for a robot that is not in the library.
+
+    Only arms of the stated reach and payload are offered: another arm's lengths would be a wrong program.
+    """
+    reach, payload = _REACH.search(model.upper()), _PAYLOAD.search(model.upper())
+
+    def is_same(name: str) -> bool:
+        its_reach, its_payload = _REACH.search(name.upper()), _PAYLOAD.search(name.upper())
+        same_reach = reach is None or (its_reach is not None and its_reach[1] == reach[1])
+        return same_reach and payload is not None and its_payload is not None and its_payload[1] == payload[1]
+
+    meant = [name for name in known if is_same(name)]
+    if len(meant) == 1 and reach is not None:
+        return f"did you mean {meant[0]!r}?"
+    if meant:
+        return f"by its payload it may be one of {', '.join(meant)}: see the plate on the arm"
+    if reach is None:
+        import difflib
+
+        of_no_reach = {_fold(name): name for name in known if not _REACH.search(name.upper())}
+        for near in difflib.get_close_matches(_fold(model), of_no_reach, n=1, cutoff=0.8):
+            return f"did you mean {of_no_reach[near]!r}?"
+    return (
+        "the arms of the library have other lengths: `gcode2krl init --controller arm.urdf`, or "
+        '`gcode2krl init` with its data sheet, or model = "my.toml"'
+    )
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

@@ -9,13 +9,13 @@ import csv
 import json
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.errors import NotUnderstoodError, input_error
+from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.units import MM_PER_INCH
 
 _LARGEST_BYTES = 64_000_000
@@ -39,6 +39,9 @@ _NOT_OF_A_CELL = re.compile(
     r"\btap\b|thread|ream|probe|slit|dovetail|lollipop|counter|\bbor|turning|holder", re.IGNORECASE
 )
 _UNITS = {"mm": 1.0, "millimeters": 1.0, "inch": MM_PER_INCH, "inches": MM_PER_INCH, "in": MM_PER_INCH}
+
+_ASKED = {"kind": "flat", "teeth": "2", "corner_radius_mm": "0.5"}
+"""Keys without which a section would say something that the file does not, with examples."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,47 @@ def read_tools(file: Path, unit: str = "") -> list[FileTool]:
     if not tools:
         raise _no_library(file, "no tool in it")
     return tools
+
+
+def sections_of(
+    tools: Iterable[FileTool], stated: Mapping[int, Mapping[str, Any]], source: str
+) -> tuple[dict[int, dict[str, Any]], list[Issue]]:
+    """Return the sections ``[tool.N]`` of tools, and a finding for each that has none or no length.
+
+    ``stated`` holds keys that the file leaves open, by the tools' numbers.
+    """
+    sections: dict[int, dict[str, Any]] = {}
+    issues: list[Issue] = []
+
+    def left_out(tool: FileTool, why: str, remedy: str) -> None:
+        place = f"T{tool.number} " if tool.number is not None else ""
+        issues.append(Issue("warning", "tool-file", 0, f"{place}{tool.name}: {why}; left out", remedy))
+
+    for tool in tools:
+        number = tool.number
+        keys = {**tool.keys, **stated.get(number or 0, {})}
+        if tool.unread:
+            left_out(tool, tool.unread, "describe it in the cell by hand where a program needs it")
+        elif number is None:
+            left_out(tool, "it has no number", "number it in the library")
+        elif number in sections:
+            left_out(tool, "the number is taken by an earlier tool", "number it otherwise in the library")
+        elif lacking := [key for key in _ASKED if key not in keys and key in _asked_of(keys)]:
+            words = " ".join(f"--set {number}.{key}={_ASKED[key]}" for key in lacking)
+            left_out(tool, f"{' and '.join(lacking)} not stated", words)
+        else:
+            # what a CAM system keeps was never measured on this spindle
+            sections[number] = keys | {"source": f"{tool.name}, from {source}", "sure": "assumption"}
+            if "length_mm" not in keys:
+                sentence = f"T{number} {tool.name}: no length from the spindle's gauge line to the tip"
+                issues.append(
+                    Issue("note", "tool-file", 0, sentence, f"measure it: --set {number}.length_mm=")
+                )
+    return sections, issues
+
+
+def _asked_of(keys: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(_ASKED) if keys.get("kind") == "bull-nose" else ("kind", "teeth")
 
 
 def _no_library(file: Path, why: str) -> NotUnderstoodError:

@@ -188,6 +188,13 @@ INTERRUPTED = 130
 @click.option("--against", metavar="FOLDER", help="Compare with the output of an earlier batch.")
 @click.option("--cell", "cell_path", type=click.Path(), help="Cell file; default: the demonstration cell.")
 @click.option("--job", "job_path", type=click.Path(), metavar="JOB.toml", help="Laid over the cell.")
+@click.option(
+    "--tools",
+    "tools_path",
+    type=click.Path(),
+    metavar="LIBRARY",
+    help="Tools that the cells do not have, as `tools import` reads them.",
+)
 @click.option("--tolerance", "tolerance_mm", type=float, metavar="MM", help="Blend corners within this.")
 @click.option(
     "--chord-tolerance",

@@ -1,4 +1,4 @@
-"""``gcode2krl identify stiffness``: stiffness of the virtual joints from measuring cubes under load."""
+"""``gcode2krl identify stiffness``: stiffness of the virtual joints from measuring cubes, or from pulls."""
 
 import io
 from pathlib import Path
@@ -8,8 +8,8 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import common_options, read_cell, require_fit_outputs
-from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_fit_outputs
+from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.units import UM_PER_MM
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     epilog=examples(
         "gcode2krl identify stiffness examples/identify/robot.toml",
         "gcode2krl identify stiffness examples/identify/robot.toml --plot fit.png --apply cell.toml",
+        "gcode2krl identify stiffness --pulls form.csv --cell cell.toml",
     ),
 )
 @click.argument("measurements")
@@ -31,6 +32,33 @@ if TYPE_CHECKING:
     "--plot", metavar="FIGURE.png", help="Draw measured against model angles, residuals, intervals."
 )
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the stiffness into this cell file.")
+@click.option(
+    "--pulls", "is_pulls", is_flag=True, help="MEASUREMENTS is a form of pulls; it is written if not there."
+)
+@click.option("--poses", type=click.IntRange(4, 40), default=10, show_default=True, help="Of a new form.")
+@click.option(
+    "--force",
+    "force_N",
+    type=click.FloatRange(min=1.0),
+    metavar="N",
+    help="Of a new form; default: half payload.",
+)
+@click.option(
+    "--point",
+    "point_mm",
+    nargs=3,
+    type=float,
+    metavar="X Y Z",
+    help="Where to pull, in mm of the flange frame; default: a bar along its x.",
+)
+@click.option(
+    "--balance",
+    "balance_percent",
+    type=click.FloatRange(0.0, 50.0),
+    default=1.0,
+    show_default=True,
+    help="1-sigma of the force in percent; 0: weighed masses.",
+)
 def command(
     measurements: str,
     cell_path: str | None,
@@ -39,15 +67,34 @@ def command(
     verbose: bool,
     plot: str | None,
     apply_to: str | None,
+    is_pulls: bool,
+    poses: int,
+    force_N: float | None,
+    point_mm: tuple[float, float, float] | None,
+    balance_percent: float,
 ) -> int:
-    """Fit the stiffness of the robot's joints and links to distances of measuring cubes.
+    """Fit the stiffness of the robot's joints and links to distances of measuring cubes, or to pulls.
 
     MEASUREMENTS is the TOML head that describes cubes, lasers and load, or the CSV with the readings beside
     it; docs/identification.md has the format. A stiffness that the readings do not determine is named, not
     applied.
+
+    With --pulls MEASUREMENTS is a CSV form: poses for this cell, a bar at the flange to pull at, a dial
+    gauge. Where the file is not there, it is written; filled in, it gives the stiffness about A1 to A6.
     """
     console = Console(quiet, as_json)
+    if is_pulls and not Path(measurements).exists():
+        from gcode2krl.cli.pulls import write_form
+
+        try:
+            cell = read_cell(cell_path)
+            inputs = [Path(file) for file in cell_files(cell_path)]
+            return write_form(Path(measurements), cell, poses, force_N, point_mm, inputs, console)
+        except Gcode2KrlError as error:
+            return console.refused(error, ("k_Nmm_rad", "level", "relative_band"), measurements)
     console.heading.reads(measurements)
+    if is_pulls:
+        return _pulls(measurements, cell_path, plot, apply_to, balance_percent, console)
     try:
         result, files = _run(measurements, cell_path, plot, apply_to, console)
     except Gcode2KrlError as error:
@@ -61,6 +108,33 @@ def command(
         console.findings(result.issues, result.source)
         for file in files:
             console.say(f"  wrote  {file}")
+    return exit_code
+
+
+def _pulls(
+    form: str, cell_path: str | None, plot: str | None, apply_to: str | None, percent: float, console: Console
+) -> int:
+    """Fit a filled-in form of pulls."""
+    from gcode2krl.cli import pulls as told
+    from gcode2krl.identify.pulls import fit, read_form
+
+    try:
+        if plot is not None:
+            raise input_error("option-value", "--plot: not of --pulls", "leave it out")
+        cell = read_cell(cell_path)
+        require_fit_outputs(None, apply_to, cell_path, form, form)
+        result = fit(read_form(form), cell, percent / 100.0)
+        is_applied = apply_to is not None and not result.errors()
+        files = [told.apply(result, Path(apply_to))] if apply_to is not None and is_applied else []
+    except Gcode2KrlError as error:
+        return console.refused(error, told.KEYS, form)
+    exit_code = 1 if result.errors() else 0
+    if console.as_json:
+        return console.record(told.record_of(result), result.issues, exit_code=exit_code, files=files)
+    told.say_fit(result, cell, console)
+    console.findings(result.issues, result.source)
+    for file in files:
+        console.say(f"  wrote  {file}")
     return exit_code
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 SCHEMA = "gcode2krl-cell.schema.json"
 """Name of the schema that is written beside a cell file, for editors."""
+DRAFT = ".answers"
+"""Behind the name of a cell file: the answers of a dialogue that was ended."""
 
 
 @click.command(
@@ -62,7 +64,7 @@ def command(
     from gcode2krl.cell.setup.cell_text import text_of_cell
     from gcode2krl.cell.setup.controller import ArchivedController, read_controller
     from gcode2krl.cli.cell_list import findings, missing_keys
-    from gcode2krl.cli.init_dialogue import ask, questions_text
+    from gcode2krl.cli.init_dialogue import questions_text
 
     if questions:
         click.echo(questions_text(), nl=False)
@@ -76,7 +78,8 @@ def command(
         raise input_error("init-answer", sentence, "`gcode2krl init --questions` prints such a file")
     controller = read_controller(archive) if archive is not None else ArchivedController(source="")
     _say_read(console, controller)
-    given = ask(controller) if answers_path is None else read_answers(answers_path, controller)
+    draft = cell_path.with_name(f"{cell_path.name}{DRAFT}")
+    given = _asked(controller, draft, console) if is_asked else read_answers(answers_path, controller)
     answers = completed(given, controller)
     text = text_of_cell(answers, controller, SCHEMA)
     cell = _resolved(text, cell_path)
@@ -85,12 +88,39 @@ def command(
 
     lacking, issues = missing_keys(cell), findings(cell)
     skipped = [question.key for question in left_out(answers)]
+    if is_asked:
+        draft.unlink(missing_ok=True)
     if as_json:
         files = (cell_path, cell_path.with_name(SCHEMA))
         return console.record({"missing": lacking, "not_answered": skipped}, issues, files=files)
     console.findings(issues, str(cell_path))
     _say_written(console, cell_path, lacking)
     return 0
+
+
+def _asked(controller: "ArchivedController", draft: Path, console: Console) -> dict[str, Any]:
+    """Ask the questions, from a draft on where one was left; Ctrl-C leaves one."""
+    import tomli_w
+
+    from gcode2krl.cell.library import read_toml
+    from gcode2krl.cli.init_dialogue import Stopped, ask
+    from gcode2krl.files import write_together
+
+    known = read_toml(draft) if draft.exists() else {}
+    if known:
+        console.hint(f"{draft}: the answers of before are proposed")
+    try:
+        return ask(controller, known)
+    except Stopped as stopped:
+        tools = [_stated(tool) for tool in stopped.answers["tools"]]
+        answers = {**known, **_stated(stopped.answers), "tools": [tool for tool in tools if tool]}
+        write_together({draft: tomli_w.dumps(answers).encode("utf-8")})
+        console.hint(f"\nanswers kept in {draft}: the same command goes on")
+        raise KeyboardInterrupt from None
+
+
+def _stated(answers: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in answers.items() if value is not None}
 
 
 def _refuse_existing(cell_path: Path, force: bool) -> None:

@@ -147,15 +147,25 @@ def simplify_option(function: Any) -> Any:
 
 
 def job_option(function: Any) -> Any:
-    """Add --job to a command that reads a part."""
-    option = click.option(
-        "--job",
-        "job_path",
-        type=click.Path(),
-        metavar="JOB.toml",
-        help="What the CAM knows: its cutters and stock, laid over the cell.",
-    )
-    return option(function)
+    """Add --job and --tools to a command that reads a part."""
+    for option in (
+        click.option(
+            "--tools",
+            "tools_path",
+            type=click.Path(),
+            metavar="LIBRARY",
+            help="Tools that the cell does not have, as `tools import` reads them, for this call.",
+        ),
+        click.option(
+            "--job",
+            "job_path",
+            type=click.Path(),
+            metavar="JOB.toml",
+            help="What the CAM knows: its cutters and stock, laid over the cell.",
+        ),
+    ):
+        function = option(function)
+    return function
 
 
 def isolated_option(function: Any) -> Any:
@@ -209,9 +219,11 @@ def read_cell(path: str | None) -> "Cell":
     return cell
 
 
-def read_cell_under_job(path: str | None, job_path: str | None) -> "tuple[Cell, tuple[Issue, ...]]":
-    """Read the cell of a command and lay a job over it; the findings say where the two differ."""
-    cell, issues = reading.read_cell_under_job(path, job_path)
+def read_cell_under_job(
+    path: str | None, job_path: str | None, tools_path: str | None = None
+) -> "tuple[Cell, tuple[Issue, ...]]":
+    """Read the cell of a command under a library of tools and a job, see `translation.inputs`."""
+    cell, issues = reading.read_cell_under_job(path, job_path, tools_path)
     heading().has_cell(cell, path)
     return cell, issues
 

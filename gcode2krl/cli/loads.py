@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from gcode2krl.cell import Cell
+from gcode2krl.compliance import stiffness
 from gcode2krl.prediction.forecast import LoadFigures
 from gcode2krl.units import GRAVITY_M_S2, MM_PER_M
 
@@ -41,3 +42,5 @@ def load_lines(loads: LoadFigures | None, cell: Cell) -> Iterator[str]:
         f"  deflection up to {loads.deflection_mm:.2f} mm +- {loads.deflection_band:.0%} (90 %), "
         f"{loads.across_mm:.2f} mm normal to the feed"
     )
+    if assumed := stiffness(cell).assumed:
+        yield f"             {assumed}"

@@ -84,6 +84,7 @@ def command(
     block_delete: bool,
     simplify_mm: float | None,
     job_path: str | None,
+    tools_path: str | None,
     dt_s: float | None,
     csv: bool,
     plot: bool,
@@ -108,10 +109,14 @@ def command(
         require_part(part)
         folder = _folder(part, output)
         inputs = existing(
-            part, nominal, *cell_files(cell_path), *files_of_job(job_path), *effect_files(effect_folders)
+            part,
+            nominal,
+            *cell_files(cell_path),
+            *files_of_job(job_path, tools_path),
+            *effect_files(effect_folders),
         )
         _require_outputs(folder, part_mesh, inputs)
-        cell, of_job = read_cell_under_job(cell_path, job_path)
+        cell, of_job = read_cell_under_job(cell_path, job_path, tools_path)
         toolpath = read_part(part, cell, console, chord_tolerance_mm, block_delete, dialect, search)
         toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job, *project.issues))
         from gcode2krl.pipeline import add_effects, corner_table, predict_toolpath

@@ -79,6 +79,8 @@ def command(
     The tool axis is Z of $BASE. Pose and branch are those of a program there: one branch, nearest to HOME,
     within the joint limits. Figures and CSV go into the folder.
     """
+    from gcode2krl.compliance import assumed_stiffness
+
     console = Console(quiet, as_json)
     folder, inputs = Path(output), cell_files(cell_path)
     try:
@@ -97,8 +99,9 @@ def command(
         "stiffest_spin_deg": None if best is None else float(spins.spin_deg[best]),
         "stiffest_spin_mm": None if best is None else float(usable[best]),
     }
+    issues = [assumed] if (assumed := assumed_stiffness(cell, "note")) is not None else []
     if as_json:
-        return console.record(result, files=files)
+        return console.record(result, issues, files=files)
     console.say(f"{output}: {', '.join(file.name for file in files)}")
     console.say(f"  {case.words}, tool T{case.tool}, at X {at_mm[0]:g} Y {at_mm[1]:g} Z {at_mm[2]:g}")
     console.say(f"  deflection {result['deflection_mm']:.4f} mm at spin {case.spin_deg:g} deg")
@@ -106,6 +109,7 @@ def command(
         console.say(f"  stiffest at spin {spins.spin_deg[best]:g} deg: {usable[best]:.4f} mm")
     most = max(shares, key=lambda name: shares[name])
     console.say(f"  most of it from {most}: {shares[most] / max(sum(shares.values()), 1e-12):.0%}")
+    console.findings(issues, cell.name)
     return 0
 
 

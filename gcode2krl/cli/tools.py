@@ -1,19 +1,16 @@
 """``gcode2krl tools import FILE --cell cell.toml``: cutters of a CAM system's library become ``[tool.N]``."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from gcode2krl.cell.tool_files import FileTool, read_tools
+from gcode2krl.cell.tool_files import read_tools, sections_of
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
-
-_NEEDED = {"kind": "flat", "teeth": "2", "corner_radius_mm": "0.5"}
-"""Keys without which a section would say something that the file does not, with examples."""
 
 
 @click.group("tools", epilog=examples("gcode2krl tools import library.json --cell cell.toml"))
@@ -64,7 +61,7 @@ def import_(
         console.heading.reads(file)
         numbers = _numbers(only)
         tools = [tool for tool in read_tools(Path(file), unit or "") if not numbers or tool.number in numbers]
-        sections, issues = _sections(tools, _pairs(stated), Path(file).name)
+        sections, issues = sections_of(tools, _pairs(stated), Path(file).name)
         written: list[Path] = []
         there: dict[int, Any] = {}
         if cell_path is not None:
@@ -111,62 +108,14 @@ def _pairs(words: Sequence[str]) -> dict[int, dict[str, Any]]:
     return pairs
 
 
-def _sections(
-    tools: Iterable[FileTool], stated: Mapping[int, Mapping[str, Any]], source: str
-) -> tuple[dict[int, dict[str, Any]], list[Issue]]:
-    """Return the sections of the tools by their numbers, and a finding for each that has none."""
-    sections: dict[int, dict[str, Any]] = {}
-    issues: list[Issue] = []
-
-    def left_out(tool: FileTool, why: str, remedy: str) -> None:
-        place = f"T{tool.number} " if tool.number is not None else ""
-        issues.append(Issue("warning", "tool-file", 0, f"{place}{tool.name}: {why}; left out", remedy))
-
-    for tool in tools:
-        number = tool.number
-        keys = {**tool.keys, **stated.get(number or 0, {})}
-        if tool.unread:
-            left_out(tool, tool.unread, "describe it in the cell by hand where a program needs it")
-        elif number is None:
-            left_out(tool, "it has no number", "number it in the library")
-        elif number in sections:
-            left_out(tool, "the number is taken by an earlier tool", "number it otherwise in the library")
-        elif lacking := [key for key in _NEEDED if key not in keys and key in _needed(keys)]:
-            words = " ".join(f"--set {number}.{key}={_NEEDED[key]}" for key in lacking)
-            left_out(tool, f"{' and '.join(lacking)} not stated", words)
-        else:
-            # what a CAM system keeps was never measured on this spindle
-            sections[number] = keys | {"source": f"{tool.name}, from {source}", "sure": "assumption"}
-            if "length_mm" not in keys:
-                sentence = f"T{number} {tool.name}: no length from the spindle's gauge line to the tip"
-                issues.append(
-                    Issue("note", "tool-file", 0, sentence, f"measure it: --set {number}.length_mm=")
-                )
-    return sections, issues
-
-
-def _needed(keys: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(_NEEDED) if keys.get("kind") == "bull-nose" else ("kind", "teeth")
-
-
 def _in_cell(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> tuple[dict[int, Any], list[Issue]]:
     """Return the cell's own tools of these numbers, and a finding where theirs is another cutter."""
     from gcode2krl.cell import load_cell
-    from gcode2krl.cell.job import SHAPE, differs
+    from gcode2krl.cell.job import differences
 
     own = load_cell(cell_path).tool
     there = {number: own[number] for number in sections if number in own}
-    issues = []
-    for number, tool in there.items():
-        keys = sections[number]
-        wrong = [key for key in SHAPE if key in keys and differs(getattr(tool, key), keys[key])]
-        if wrong:
-            words = ", ".join(f"{key} {keys[key]} and {getattr(tool, key)} in the cell" for key in wrong)
-            remedy = f"correct [tool.{number}] of the cell, or renumber the tool in the CAM system"
-            issues.append(
-                Issue("warning", "tool-differs", 0, f"T{number}: {words}; the cell's stays", remedy)
-            )
-    return there, issues
+    return there, [issue for n, tool in there.items() for issue in differences(n, tool, sections[n])]
 
 
 def _added(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> list[Path]:

@@ -60,6 +60,7 @@ def command(
     no_forces: bool,
     allow: tuple[str, ...],
     job_path: str | None,
+    tools_path: str | None,
     from_line: int | None,
 ) -> int:
     """Read a KRL program back, compare it with its G-code, and judge its hazards anew.
@@ -73,7 +74,7 @@ def command(
 
         console.heading.reads(program, part)
         refuse_other_start(program, from_line)
-        cell, of_job = read_cell_under_job(cell_path, job_path)
+        cell, of_job = read_cell_under_job(cell_path, job_path, tools_path)
         with console.stages() as begin:
             toolpath = read_from_line(
                 part,

@@ -116,12 +116,16 @@ def compensate(
 
 
 def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
-    """Raise `RefusedError` where the 90 % band's half-width exceeds half the correction.
+    """Raise `RefusedError` where the stiffness is not stated, or the band exceeds half the correction.
 
     Measured coefficients and stiffness are exempt: the stiffness of robot and end effector must be "verified"
     or "checked", and so must the material, whose source must say that it was identified. A published set of
     coefficients may be "verified" as a quotation, which is not a measurement of this material.
     """
+    assumed = compliance.assumed_stiffness(cell)
+    if assumed is not None:
+        sentence = f"{assumed.message}: a correction by it could make the part worse"
+        raise RefusedError(replace(assumed, code="compensation-unsure", message=sentence))
     if deflection.relative_band <= MOST_BAND or identified(cell):
         return
     sentence = (

@@ -10,10 +10,11 @@ from gcode2krl.compliance.deflection import (
     tip_velocity,
 )
 from gcode2krl.compliance.deflection_table import deflect, deflect_at
-from gcode2krl.compliance.model import missing_stiffness
+from gcode2krl.compliance.model import assumed_stiffness, missing_stiffness, stiffness
 from gcode2krl.compliance.projection import project_normal
 
 __all__ = [
+    "assumed_stiffness",
     "deflect",
     "deflect_at",
     "deflection_magnitude",
@@ -23,6 +24,7 @@ __all__ = [
     "joint_shares",
     "missing_stiffness",
     "project_normal",
+    "stiffness",
     "tip_position",
     "tip_velocity",
 ]

@@ -6,6 +6,7 @@ from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import points_moved, to_rest, vectors_turned
 from gcode2krl.compliance.deflection import deflection_of, feed_direction, tip_position
+from gcode2krl.compliance.model import stiffness
 from gcode2krl.frames import invert
 from gcode2krl.tables import Deflection, Forces, Joints, chord_directions
 
@@ -56,7 +57,7 @@ def deflect_at(q_rad: Floats, qd_rad_s: Floats, external: Floats, forces: Forces
     return Deflection(
         deflection_base_mm=deflection,
         correction_base_mm=correction,
-        relative_band=math.hypot(forces.relative_band, cell.compliance.relative_band),
+        relative_band=math.hypot(forces.relative_band, stiffness(cell).relative_band),
     )
 
 

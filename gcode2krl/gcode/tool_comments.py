@@ -39,6 +39,8 @@ _OTHER = re.compile(r"\b(?:STOCK|HOLE|BORE|POCKET|HOLDER|SHANK|OFFSET|TAPER)\b")
 _COMMENT = re.compile(rb"\(([^)\n]*)\)|;([^\n]*)")
 _SLACK, _SLACK_MM = 0.02, 0.05
 """Comments round; a worn or reground mill is this far off."""
+_SURE = ("verified", "checked")
+"""What the cell says of a tool that a person has looked at."""
 
 
 class NamedTool(NamedTuple):
@@ -105,9 +107,10 @@ def _value(text: str) -> float:
 
 
 def other_tools(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Iterator[Issue]:
-    """Yield a warning for each tool whose diameter in a comment is not that of the cell.
+    """Yield a finding for each tool whose diameter in a comment is not that of the cell.
 
-    A comment without a tool number counts where the program has one tool.
+    An error where both are sure: the comment names the tool, and a person has checked the cell's. A comment
+    without a tool number counts where the program has one tool.
     """
     used = {int(number) or (cell.mounted_tool or 0) for number in distinct(toolpath.tool[1:])}
     used -= {0} if len(used) > 1 else set()
@@ -122,8 +125,9 @@ def other_tools(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Ite
             continue
         told.add(number)
         unit = f" {said.unit}" if said.unit else ""
+        is_sure = said.tool is not None and (tool.sure in _SURE or cell.is_confirmed)
         yield Issue(
-            "warning",
+            "error" if is_sure else "warning",
             "tool-differs",
             said.line,
             f"the comment gives T{number} a diameter of {said.value:g}{unit}, the cell has "

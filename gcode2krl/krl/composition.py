@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from gcode2krl import compliance
 from gcode2krl import frames as fr
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
@@ -463,6 +464,7 @@ class _Composer:
             ),
             guard=self.layout.guard,
             forces=self.layout.forces,
+            assumed=_assumed_words(self.cell),
             collisions=self._collision_lines(),
             provenance=provenance_lines(self.cell, tools, self.pilot is not None, self.rsi is not None),
             restart=self.targets.restart,
@@ -569,6 +571,11 @@ def _text(text: str) -> bytes:
     """Encode text with the controller's line ends; blank lines are dropped."""
     lines = [line.rstrip() for line in re.split(r"\r?\n", text)]
     return b"".join(line.encode("ascii", "replace") + NEWLINE for line in lines if line)
+
+
+def _assumed_words(cell: Cell) -> str:
+    """Return what of the stiffness nobody stated; empty where no deflection is predicted."""
+    return "" if compliance.missing_stiffness(cell) else compliance.stiffness(cell).assumed
 
 
 def _file_name(source: str) -> str:

@@ -20,7 +20,7 @@ from gcode2krl.cell.carried import require_still
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, INT, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
 from gcode2krl.compiled.inputs import shaped
-from gcode2krl.compliance import deflection_of, missing_stiffness
+from gcode2krl.compliance import assumed_stiffness, deflection_of
 from gcode2krl.compliance.sensor import Calibration, compensate, transfer_to_tcp
 from gcode2krl.errors import NotUnderstoodError, input_error
 from gcode2krl.online.feed import FeedState, feed_of, feed_start
@@ -262,7 +262,7 @@ def build_compensator(
     NotUnderstoodError
         Where the cell does not state the stiffness of every virtual joint, or has no such tool.
     """
-    missing = missing_stiffness(cell)
+    missing = assumed_stiffness(cell)
     if missing is not None:
         raise NotUnderstoodError(missing, cell.name)
     if tool not in cell.tool:

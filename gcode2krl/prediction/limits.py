@@ -173,9 +173,9 @@ class ForceLimits:
 class DeflectionLimit:
     """Deflections that come block after block, beyond the limit, or absurd."""
 
-    def __init__(self, cell: Cell) -> None:
-        """Take the limit of the cell."""
-        self._most = cell.limits.deflection_mm
+    def __init__(self, cell: Cell, known: str = "") -> None:
+        """Take the limit of the cell, and how well the stiffness is known where nobody stated it."""
+        self._most, self._known = cell.limits.deflection_mm, f" ({known})" if known else ""
         self.bent, self.across = Largest(), Largest()
         self.absurd: Issue | None = None
         """The first deflection that is absurd, None if there is none: then no other finding counts."""
@@ -198,7 +198,9 @@ class DeflectionLimit:
     def issues(self) -> Iterator[Issue]:
         """Yield the deflection that exceeds the limit, at its largest value."""
         if self.bent.value > self._most:
-            sentence = f"the tool bends away by {self.bent.value:.2f} mm, more than {self._most:g} mm"
+            sentence = (
+                f"the tool bends away by {self.bent.value:.2f} mm{self._known}, more than {self._most:g} mm"
+            )
             remedy = (
                 "cut less deep or slower, or state [stock] and a measured [compliance]; "
                 "[limits] deflection_mm judges"

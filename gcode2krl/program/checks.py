@@ -425,8 +425,9 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
                 "tool-unknown",
                 line,
                 f"T{number} is not in the cell",
-                f"`gcode2krl tools import` adds it, or write [tool.{number}] with diameter_mm, teeth and "
-                "length_mm, or tool_data",
+                f"`gcode2krl tools import LIBRARY --cell CELL.toml --only {number}` adds it: from the CAM's "
+                "library, or from this program's comments where they name them (--tools LIBRARY: one call); "
+                f"or write [tool.{number}] with diameter_mm, teeth and length_mm, or tool_data",
             )
         elif cell.tool[number].length_mm is None and cell.tool[number].frame is None:
             yield Issue(

@@ -146,24 +146,34 @@ def read_cell(path: str | Path | None) -> "Cell":
 
 
 def read_cell_under_job(
-    path: str | Path | None, job_path: str | Path | None
+    path: str | Path | None, job_path: str | Path | None, tools_path: str | Path | None = None
 ) -> "tuple[Cell, tuple[Issue, ...]]":
-    """Read the cell of a command and lay a job over it; the findings say where the two differ."""
+    """Read the cell of a command, add the tools of a library, and lay a job over it.
+
+    The findings say where they differ.
+    """
     cell = read_cell(path)
+    issues: tuple[Issue, ...] = ()
+    if tools_path is not None:
+        from gcode2krl.cell.job import with_tools
+
+        cell, issues = with_tools(cell, Path(tools_path))
     if job_path is None:
-        return cell, ()
+        return cell, issues
     from gcode2krl.cell.job import lay_job_over
 
-    return lay_job_over(cell, Path(job_path))
+    under = lay_job_over(cell, Path(job_path))
+    return under.cell, (*issues, *under.issues)
 
 
-def files_of_job(job_path: str | Path | None) -> list[Path]:
-    """Return the files of a job, which are inputs."""
+def files_of_job(job_path: str | Path | None, tools_path: str | Path | None = None) -> list[Path]:
+    """Return the files of a job and of a library of tools, which are inputs."""
+    files = [] if tools_path is None else [Path(tools_path)]
     if job_path is None:
-        return []
+        return files
     from gcode2krl.cell.job import job_files
 
-    return job_files(Path(job_path))
+    return [*files, *job_files(Path(job_path))]
 
 
 def existing(*inputs: str | Path | None) -> list[Path]:

@@ -24,6 +24,8 @@ class Order:
     """The ``.src``, its folder, None for beside the part, ``-`` for no file."""
     cell_path: str | Path | None = None
     job_path: str | Path | None = None
+    tools_path: str | Path | None = None
+    """A library with tools that the cell does not have."""
     name: str | None = None
     tolerance_mm: float | None = None
     chord_tolerance_mm: float = 0.01

@@ -19,10 +19,11 @@ if TYPE_CHECKING:  # pydantic costs a help text a noticeable start
     from gcode2krl.translation.project_file import Options, ProjectFile
 
 NAME = "gcode2krl.toml"
-_PATHS = ("cell", "job", "search", "effects")
+_PATHS = ("cell", "job", "tools", "search", "effects")
 _DESTINATIONS = {
     "cell": "cell_path",
     "job": "job_path",
+    "tools": "tools_path",
     "simplify": "simplify_mm",
     "tolerance": "tolerance_mm",
     "chord-tolerance": "chord_tolerance_mm",

@@ -27,6 +27,7 @@ class Options(BaseModel):
     job: str | None = Field(
         None, description="What the CAM knows: its cutters and stock, laid over the cell."
     )
+    tools: str | None = Field(None, description="Library of tools that the cell does not have.")
     dialect: Annotated[str, AfterValidator(_known)] | None = Field(
         None,
         description="What the post wrote the G-code for.",

@@ -203,10 +203,10 @@ def _ready(order: Order, known: _Known) -> _Ready:
     place = place_of(order)
     refuse_online(order, place)
     refuse_without_forces(order.from_line, order.no_forces)
-    known.cell, of_job = read_cell_under_job(order.cell_path, order.job_path)
+    known.cell, of_job = read_cell_under_job(order.cell_path, order.job_path, order.tools_path)
     cell = _with_options(known.cell, order)
     name = restart_name(part, order.name, output, order.from_line, cell)
-    inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path))
+    inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path, order.tools_path))
     require_figure(order.compensate_plot)
     require_report(order.report, inputs)
     outputs = outputs_of(order, place, name, cell)
@@ -322,6 +322,7 @@ def _header_words(order: Order, cell: "Cell") -> str:
         "dialect": order.dialect if order.dialect != DIALECT_NAMES[0] else None,
         "search": ",".join(Path(folder).name for folder in order.search) or None,
         "job": Path(order.job_path).name if order.job_path is not None else None,
+        "tools": Path(order.tools_path).name if order.tools_path is not None else None,
         "spin": cell.frames.spin,
         "compensate": order.compensate,
         "online": order.online,

@@ -10,14 +10,15 @@ from prompt_toolkit.output import DummyOutput
 
 from examples import make_cells
 from gcode2krl import load_cell
+from gcode2krl.cell import library
 from gcode2krl.cell.setup.answers import completed, read_answers
 from gcode2krl.cell.setup.cell_text import text_of_cell
 from gcode2krl.cell.setup.controller import ArchivedController, read_controller
 from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, TOOL_QUESTIONS
 from gcode2krl.cli.init import SCHEMA
-from gcode2krl.cli.init_dialogue import ask, questions_text
+from gcode2krl.cli.init_dialogue import Stopped, ask, questions_text
 from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_zip
-from tests.cell.setup.typist import ENTER, keys
+from tests.cell.setup.typist import CLEAR, ENTER, keys
 from tests.conftest import ROOT
 
 FOLDER = ROOT / "examples" / "cells"
@@ -326,3 +327,109 @@ def test_a_robot_that_is_not_in_the_library_comes_from_the_archive(run, tmp_path
     assert (robot.model, robot.trafo_name, robot.geometry.c3_mm) == ("", "KR240R3330 C4 FLR", 1345.0)
     assert robot.limits.q_deg == cell.robot.limits.q_deg
     assert robot.speeds.qd_deg_s == pytest.approx(cell.robot.speeds.qd_deg_s, abs=0.06)
+
+
+# --- a robot that is not in the library -------------------------------------------------------------------
+
+DATA_SHEET = """name = "Long arm"
+robot = "other"
+lengths_mm = [350.0, -145.0, 675.0, 1600.0, 1950.0, 215.0]
+reach_mm = 3901.0
+payload_kg = 120.0
+limits_deg = [-150, 150, -130, 70, -105, 155, -350, 350, -122.5, 122.5, -350, 350]
+mounting = "floor"
+home = [0, -90, 90, 0, 0, 0]
+base_number = 0
+base = [2400, 0, 900, 0, 0, 0]
+clearance_mm = 150
+"""
+MACHINE = """tools_by = "length"
+reference_frame = [250, 0, 250, 0, -90, 0]
+reference_length_mm = 100
+reference_axis = "+z"
+tool_change = "hand"
+mounted_tool = 1
+load_kg = 60.0
+load_centre_mm = [100, 0, 180]
+spindle_max_rpm = 18000
+spindle_speed = "drive"
+run_output = 11
+start_s = 5.0
+stop_s = 8.0
+[[tools]]
+number = 1
+model = "flat 16 z3"
+length_mm = 100
+
+"""
+
+
+def answers_file(folder, text=DATA_SHEET):
+    (folder / "answers.toml").write_text(text + MACHINE, "utf-8")
+
+
+def test_an_arm_by_its_data_sheet_writes_a_program(run, tmp_path):
+    """An arm of 120 kg and 3.9 m: no editor, two commands."""
+    answers_file(tmp_path)
+    done = run("init", "--answers", "answers.toml")
+    assert done.code == 0, done.err
+    cell = load_cell(tmp_path / "cell.toml")
+    assert cell.robot.geometry.c3_mm == 1950.0
+    assert cell.robot.payload.reach_mm == 3901.0
+    (tmp_path / "part.nc").write_text(
+        "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\nG0 X0 Y0\nG1 Z-1 F600\nG1 X20\nG0 Z30\nM5\nM30\n",
+        "utf-8",
+    )
+    done = run("part.nc", "--cell", "cell.toml", "-o", "part.src")
+    assert done.code == 0, done.err
+    assert (tmp_path / "part.src").exists()
+
+
+def test_lengths_that_do_not_give_the_reach_are_refused(run, tmp_path):
+    answers_file(tmp_path, DATA_SHEET.replace("1950.0", "1590.0"))
+    done = run("init", "--answers", "answers.toml")
+    assert done.code == 2
+    assert "the lengths reach" in done.err
+    assert not (tmp_path / "cell.toml").exists()
+
+
+def test_a_robot_file_may_be_named(run, tmp_path):
+    (tmp_path / "my.toml").write_text(
+        (ROOT / "models" / "robots" / "kr_210_2.toml").read_text("utf-8"), "utf-8"
+    )
+    lines = [
+        line
+        for line in DATA_SHEET.splitlines()
+        if not line.startswith(("lengths", "reach", "payload", "robot"))
+    ]
+    answers_file(tmp_path, 'robot = "my.toml"\n' + "\n".join(lines) + "\n")
+    done = run("init", "--answers", "answers.toml")
+    assert done.code == 0, done.err
+    assert load_cell(tmp_path / "cell.toml").robot.model == "KR 210-2"
+
+
+@pytest.mark.parametrize(
+    ("asked", "offered"),
+    [
+        ("KR 120 R3900 K", []),
+        ("KR 999 R2700", []),
+        ("KR 300 R2500", ["KR 300 R2500 ultra"]),
+        ("KR 210 R2700-3", ["KR 210 R2700 extra", "KR 210 R2700 prime", "KR 210 R2700-2"]),
+        ("KR 61 HA", ["KR 60 HA"]),
+    ],
+)
+def test_no_arm_of_another_reach_is_offered(asked, offered):
+    remedy = library.robot_meant(asked, sorted(library.names("robots")))
+    assert [name for name in sorted(library.names("robots")) if name in remedy] == offered
+
+
+def test_back_and_a_draft(tmp_path):
+    """`<` asks the question before again; Ctrl-C keeps the answers, which the next dialogue proposes."""
+    with pytest.raises(Stopped) as stopped:
+        typed(["First" + ENTER, "<" + ENTER, CLEAR + "Second" + ENTER, "\x03"])
+    assert stopped.value.answers["name"] == "Second"
+    with create_pipe_input() as pipe, create_app_session(input=pipe, output=DummyOutput()):
+        pipe.send_text(ENTER + "\x03")
+        with pytest.raises(Stopped) as again:
+            ask(NOBODY, stopped.value.answers)
+    assert again.value.answers["name"] == "Second"

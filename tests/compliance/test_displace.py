@@ -156,11 +156,14 @@ class TestDisplace:
 
     def test_missing_stiffness_is_refused_by_name(self, cell):
         assert missing_stiffness(cell) is None
-        without = resolve_cell({"based_on": "demonstration", "robot": {"model": "KR 210 R2700-2"}})
+        lengths = cell.robot.geometry.model_dump(
+            include={"a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm"}
+        )
+        without = resolve_cell({"based_on": "demonstration", "robot": {"geometry": lengths}})
         with pytest.raises(NotUnderstoodError, match=r"A1, A2, linked_arm, A3, arm, A4, A5, A6") as error:
             displace(HOME, NONE, NONE, without)
         assert "sensor" not in str(error.value)
-        assert "compliance.virtual_joints" in error.value.issues[0].remedy
+        assert "robot.payload" in error.value.issues[0].remedy
         assert error.value.issues == (missing_stiffness(without),)
         assert np.isfinite(tip_position(HOME, without)).all()
 

@@ -1,5 +1,6 @@
 """Answers to the questions: from words or a TOML file, checked, completed by the controller's archive."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from gcode2krl.cell.ranges import all_ranges
 from gcode2krl.cell.ranges import general as general_key
 from gcode2krl.cell.setup.controller import FRAME_KEYS, ArchivedController
 from gcode2krl.cell.setup.questions import (
+    FILE,
     GENERAL_QUESTIONS,
     MACHINE_QUESTIONS,
     TOOL_QUESTIONS,
@@ -21,6 +23,7 @@ from gcode2krl.codes import closest
 from gcode2krl.errors import Issue, NotUnderstoodError
 
 MOST_TOOLS = 1000
+_SAME_REACH = 0.01
 _NAME = re.compile(r"[^\x00-\x1f\x7f\x85\u2028\u2029]{1,80}")
 _SUBPROGRAM = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,23}")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -78,10 +81,15 @@ def checked(question: CellQuestion, value: Any, controller: ArchivedController) 
 
 def _choice(question: CellQuestion, value: Any, controller: ArchivedController) -> str:
     known = [name for name, _ in question.choices(controller)] if question.choices else []
+    if question.key == "robot" and isinstance(value, str) and value.endswith(".toml"):
+        return value
     folded = {_fold(name): name for name in known}
     if not isinstance(value, str) or _fold(value) not in folded:
-        near = closest(str(value), known)
-        meant = f"; did you mean {near!r}?" if near else ""
+        if question.key == "robot":
+            meant = f"; {library.robot_meant(str(value), known)}"
+        else:
+            near = closest(str(value), known)
+            meant = f"; did you mean {near!r}?" if near else ""
         raise ValueError(f"found {str(value)[:60]!r}, allowed: {', '.join(known)}{meant}")
     return folded[_fold(value)]
 
@@ -134,7 +142,9 @@ def _take(
         return
     is_answered = question.key in given  # with None by who left it out at the terminal
     value = given[question.key] if is_answered else question.proposal(controller, answers)
-    if value is not None:
+    if question.key == "robot" and str(value).endswith(".toml"):
+        answers |= {"robot": FILE, "robot_file": value}
+    elif value is not None:
         answers[question.key] = value
 
 
@@ -181,8 +191,26 @@ def _checked_table(
     return answers
 
 
+def lengths_problem(answers: Answers) -> str | None:
+    """Return what is wrong where the lengths do not give the reach of the data sheet; None where they do.
+
+    Makers state the reach of the wrist's centre, some rounded: the library's agree within 0.3 %.
+    """
+    lengths, reach_mm = answers.get("lengths_mm"), answers.get("reach_mm")
+    if not lengths or not reach_mm:
+        return None
+    a1, a2, _, c2, c3, _ = lengths
+    found_mm = a1 + c2 + math.hypot(c3, a2)
+    if abs(found_mm - reach_mm) <= _SAME_REACH * reach_mm:
+        return None
+    return f"the lengths reach {found_mm:.0f} mm (a1 + c2 + hypot(c3, a2)), the data sheet {reach_mm:g} mm"
+
+
 def unanswered(answers: Answers) -> Iterator[Issue]:
-    """Yield an error for each question that needs an answer and has none."""
+    """Yield an error for each question that needs an answer and has none, or contradicts another."""
+    wrong = lengths_problem(answers)
+    if wrong is not None:
+        yield _issue("lengths_mm", wrong)
     for place, questions, table in _tables(answers):
         for question in questions:
             if question.needed and question.when(table) and table.get(question.key) is None:

@@ -20,7 +20,7 @@ from gcode2krl.cell.sections import Clearance, Frame, Frames, Home, Load, Robot,
 from gcode2krl.cell.sections import Controller as ControllerSection
 from gcode2krl.cell.setup.answers import frame_table
 from gcode2krl.cell.setup.controller import ArchivedController, ExternalData
-from gcode2krl.cell.setup.questions import GENERAL_QUESTIONS, OTHER, UNKNOWN, Answers
+from gcode2krl.cell.setup.questions import FILE, GENERAL_QUESTIONS, OTHER, UNKNOWN, Answers
 from gcode2krl.units import DEG_PER_RAD
 
 _COMMENT_COLUMN = 30
@@ -86,7 +86,9 @@ class _Writer:
     def _robot(self) -> Iterator[str]:
         controller, robot = self.controller, self.answers.get("robot")
         yield "[robot]"
-        if robot != OTHER:
+        if robot == FILE:
+            yield from self._key(Robot, "model", self.answers.get("robot_file"), "robot_file")
+        elif robot != OTHER:
             yield from self._key(Robot, "model", robot, "robot")
         if controller.trafo_name:
             yield from _line(Robot, "trafo_name", controller.trafo_name)
@@ -94,16 +96,25 @@ class _Writer:
             yield from _line(Robot, "trafo_sure", "verified")
         if robot == OTHER:
             yield from _line(Robot, "note", "not in the library")
-        if robot == OTHER and controller.lengths_mm is not None:
+        lengths, speeds = self.answers.get("lengths_mm"), self.answers.get("speeds_deg_s")
+        if lengths:
             yield from ("", "[robot.geometry]")
             keys = ("a1_mm", "a2_mm", "c1_mm", "c2_mm", "c3_mm", "c4_mm")
-            yield from (f"{key} = {_number(v)}" for key, v in zip(keys, controller.lengths_mm, strict=True))
-            yield from self._said("$LENGTH_A, $LENGTH_B, $TIRORO, $TX3P3, $TFLWP", True)
+            yield from (f"{key} = {_number(v)}" for key, v in zip(keys, lengths, strict=True))
+            is_read = bool(self.is_of_archive.get("lengths_mm"))
+            yield from self._said("$LENGTH_A, $LENGTH_B, $TIRORO, $TX3P3, $TFLWP", is_read)
         yield from self._limits()
-        if robot == OTHER and controller.speeds_deg_s is not None:
+        if speeds:
             yield from ("", "[robot.speeds]")
-            yield f"qd_deg_s = {toml_value(list(controller.speeds_deg_s))}"
-            yield from self._said("$VEL_AXIS_MA over $RAT_MOT_AX", True)
+            yield f"qd_deg_s = {toml_value(list(speeds))}"
+            yield from self._said(
+                "$VEL_AXIS_MA over $RAT_MOT_AX", bool(self.is_of_archive.get("speeds_deg_s"))
+            )
+        rated = (("mass_kg", "payload_kg"), ("reach_mm", "reach_mm"))
+        stated = [(key, self.answers[asked]) for key, asked in rated if self.answers.get(asked)]
+        if stated:
+            yield from ("", "[robot.payload]", *(f"{key} = {_number(value)}" for key, value in stated))
+            yield from self._said("", False)
 
     def _controller(self) -> Iterator[str]:
         kss = self.answers.get("kss", UNKNOWN)

@@ -19,6 +19,20 @@ Choice = tuple[str, str]
 """A value, and the words beside it in a list."""
 Kind = Literal["choice", "text", "name", "number", "whole", "numbers"]
 OTHER = "other"
+FILE = "file"
+LENGTHS_PICTURE = """
+        A1 0, A2 -90, A3 90: link arm upright, forearm level
+
+              A3 o- - - - - - - - - - - - - - - - - - - - - -
+             |   |\\  a2: axis 4 is so much BELOW A3
+          c2 |   | o----------------- o A5 ------------|flange
+             |   |        c3                  c4
+             |A2 o- - -
+          c1 |  /     A1 to A2: a1 forward, c1 up from the floor it stands on
+             | /  a1
+        =====A1=====
+"""
+"""Which length is which, for a terminal; docs/own_cell.md has it too."""
 UNKNOWN = "unknown"
 _TOOL_MENU = "Start-up > Calibrate > Tool > Numeric input"
 _OUTPUTS = "Display > Inputs/outputs > Digital I/O"
@@ -52,6 +66,7 @@ class CellQuestion:
     choices: Callable[[ArchivedController], list[Choice]] | None = None
     proposal: Callable[[ArchivedController, Answers], Any] = _nothing
     """What the controller's archive states."""
+    picture: str = ""
 
 
 def _is(key: str, *values: Any) -> Callable[[Answers], bool]:
@@ -80,8 +95,12 @@ def _only(frames: tuple[NamedFrame, ...]) -> int | None:
 def _robots(controller: ArchivedController) -> list[Choice]:
     """Return the robots that can be it: an archive of another arm is no archive of this robot."""
     listed = [(name, "") for name in robots_of_lengths(controller.lengths_mm)]
-    where = "the file" if controller.is_description else "the archive"
-    own = [(OTHER, f"not in this list: lengths and limits from {where}")] if controller.lengths_mm else []
+    where = "those of the file" if controller.is_description else "those of the archive"
+    whose = where if controller.lengths_mm else "from its data sheet, with a picture"
+    own = [
+        (OTHER, f"not in this list: lengths and limits, {whose}"),
+        (FILE, "a robot file of yours, my.toml"),
+    ]
     return [*listed, *own]
 
 
@@ -92,8 +111,9 @@ def _robot(controller: ArchivedController, answers: Answers) -> str | None:
 def _lacks_limits(answers: Answers) -> bool:
     """Tell whether the robot is one whose joint limits the library does not know."""
     robot = str(answers.get("robot"))
-    return robot in library.names("robots") and "q_deg" not in library.read_model("robots", robot).get(
-        "limits", {}
+    return robot == OTHER or (
+        robot in library.names("robots")
+        and "q_deg" not in library.read_model("robots", robot).get("limits", {})
     )
 
 
@@ -157,6 +177,57 @@ PLACE_QUESTIONS = (
         needed=True,
         choices=_robots,
         proposal=_robot,
+    ),
+    CellQuestion(
+        "robot_file",
+        "Name of the robot file, from the cell file's folder",
+        "yours, laid out like those of `gcode2krl models show`",
+        "text",
+        "my.toml",
+        needed=True,
+        when=_is("robot", FILE),
+    ),
+    CellQuestion(
+        "lengths_mm",
+        "a1 a2 c1 c2 c3 c4 in mm; a2 is negative where axis 4 lies above A3",
+        "the dimensioned drawing on the data sheet",
+        "numbers",
+        [350.0, 41.0, 675.0, 1150.0, 1000.0, 240.0],
+        "robot.geometry",
+        6,
+        needed=True,
+        when=_is("robot", OTHER),
+        proposal=lambda controller, _: list(controller.lengths_mm) if controller.lengths_mm else None,
+        picture=LENGTHS_PICTURE,
+    ),
+    CellQuestion(
+        "reach_mm",
+        "Maximum reach in mm, which the lengths are checked with",
+        "the data sheet; the number behind R in the name is near it",
+        "number",
+        2496.0,
+        "robot.payload.reach_mm",
+        when=_is("robot", OTHER),
+    ),
+    CellQuestion(
+        "payload_kg",
+        "Rated payload in kg",
+        "the data sheet; the number behind KR in the name",
+        "number",
+        300.0,
+        "robot.payload.mass_kg",
+        when=_is("robot", OTHER),
+    ),
+    CellQuestion(
+        "speeds_deg_s",
+        "Largest speeds of A1 to A6 in degrees a second",
+        "the data sheet",
+        "numbers",
+        [105.0, 101.0, 107.0, 122.0, 113.0, 175.0],
+        "robot.speeds.qd_deg_s",
+        6,
+        when=_is("robot", OTHER),
+        proposal=lambda controller, _: list(controller.speeds_deg_s) if controller.speeds_deg_s else None,
     ),
     CellQuestion(
         "limits_deg",
