@@ -31,7 +31,18 @@ static void join(const Path *path, int64_t k, Sweep *sweep) {
     sweep->wedge = JOINT_MM + radius * (turn + fabs(sweep->next_sink) * (sqrt(2.0 * turn + turn * turn) + turn * turn));
 }
 
-static Sweep sweep_to(const Path *path, int64_t k) {
+/* Note whether the next sweep cuts deeper wherever the cutter stands at the end of this one.
+
+It has to be one of those that every reading behind this sweep knows of: no longer than the field lags. */
+static void sink_on(const Path *path, int64_t k, double lag_mm, Sweep *sweep) {
+    const int64_t next = k + 1;
+    if (next >= path->position_mm.rows || AT(path->first, next) || AT(path->rapid, k) || AT(path->rapid, next))
+        return;
+    sweep->goes_on = sweep->slope < 0.0 && place_of(path, next)[2] < place_of(path, k)[2] &&
+                     AT(path->way_mm, next) - AT(path->way_mm, k) <= lag_mm;
+}
+
+static Sweep sweep_to(const Path *path, int64_t k, double lag_mm) {
     const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const Outline *outline = outline_of(path, AT(path->tool, k));
     Sweep sweep = {.outline = outline, .ax = a[0], .ay = a[1], .az = a[2], .ex = 1.0};
@@ -48,6 +59,8 @@ static Sweep sweep_to(const Path *path, int64_t k) {
     sweep.follows = k > 1 && !AT(path->first, k - 1);
     if (outline->kind == SW_BALL)
         join(path, k, &sweep);
+    else
+        sink_on(path, k, lag_mm, &sweep);
     return sweep;
 }
 
@@ -61,7 +74,7 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
             }
 }
 
-double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
+double remove_sweep(const Grid *grid, const Path *path, int64_t k, double lag_mm) {
     const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const double radius = outline_of(path, AT(path->tool, k))->radius;
     const double x_low = lesser(a[0], b[0]) - radius, x_high = greater(a[0], b[0]) + radius;
@@ -72,7 +85,7 @@ double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
     const Cells columns = columns_between(grid, x_low, x_high, grid->height.columns - SW_LANES);
     if (rows.first >= rows.after || columns.first >= columns.after)
         return 0.0;
-    const Sweep sweep = sweep_to(path, k);
+    const Sweep sweep = sweep_to(path, k, lag_mm);
     const double worst = AT(path->rapid, k) ? cut_off_by(grid, &sweep, rows) : 0.0;
     if (sweep.outline->kind == SW_BALL)
         lower_below_ball(grid, &sweep);

@@ -5,7 +5,8 @@
 
 #include "cutting/sweep.h"
 
-/* Lower the field below the sweep that ends at sample k; return the height a rapid has cut off, else 0. */
-double remove_sweep(const Grid *grid, const Path *path, int64_t k);
+/* Lower the field, which lags so far behind what is read, below the sweep that ends at sample k; return the height a
+   rapid has cut off, else 0. */
+double remove_sweep(const Grid *grid, const Path *path, int64_t k, double lag_mm);
 
 #endif
