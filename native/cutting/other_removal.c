@@ -7,7 +7,6 @@ left out. The cells of ROWS rows are found side by side. */
 #include "cutting/swept.h"
 
 #define ROOM_CELLS 1e-3f /* for rounding of where a row enters and leaves; each cell is tested again */
-#define JOINT_MM 1e-4    /* by which a disc that is left out is smaller: its border is cut twice */
 #define FAR_MM 1e6f      /* farther than any field is wide */
 #define STEEPEST 1e9     /* in place of the reciprocal of nothing */
 

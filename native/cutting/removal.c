@@ -6,7 +6,6 @@
 
 #define NO_LENGTH_MM 1e-9
 #define LEAST_ONWARD 2.0 /* how far a sweep goes on for what it goes aside, if it follows the one before */
-#define JOINT_MM 1e-4    /* room for rounding at the joint of two sweeps */
 
 enum { REFRESH = 48 }; /* visits after which the bound of a block is computed again */
 
@@ -31,15 +30,14 @@ static void join(const Path *path, int64_t k, Sweep *sweep) {
     sweep->wedge = JOINT_MM + radius * (turn + fabs(sweep->next_sink) * (sqrt(2.0 * turn + turn * turn) + turn * turn));
 }
 
-/* Note whether the next sweep cuts deeper wherever the cutter stands at the end of this one.
-
-It has to be one of those that every reading behind this sweep knows of: no longer than the field lags. */
-static void sink_on(const Path *path, int64_t k, double lag_mm, Sweep *sweep) {
+bool leaves_disc(const Path *path, int64_t k, double lag_mm) {
     const int64_t next = k + 1;
-    if (next >= path->position_mm.rows || AT(path->first, next) || AT(path->rapid, k) || AT(path->rapid, next))
-        return;
-    sweep->goes_on = sweep->slope < 0.0 && place_of(path, next)[2] < place_of(path, k)[2] &&
-                     AT(path->way_mm, next) - AT(path->way_mm, k) <= lag_mm;
+    if (k < 1 || next >= path->position_mm.rows || AT(path->first, k) || AT(path->first, next) ||
+        AT(path->rapid, k) || AT(path->rapid, next) || outline_of(path, AT(path->tool, k))->kind == SW_BALL)
+        return false;
+    const double *a = place_of(path, k - 1), *b = place_of(path, k), *c = place_of(path, next);
+    return b[2] < a[2] && c[2] < b[2] && AT(path->way_mm, next) - AT(path->way_mm, k) <= lag_mm &&
+           squared(b[0] - a[0]) + squared(b[1] - a[1]) > squared(NO_LENGTH_MM);
 }
 
 static Sweep sweep_to(const Path *path, int64_t k, double lag_mm) {
@@ -60,7 +58,7 @@ static Sweep sweep_to(const Path *path, int64_t k, double lag_mm) {
     if (outline->kind == SW_BALL)
         join(path, k, &sweep);
     else
-        sink_on(path, k, lag_mm, &sweep);
+        sweep.goes_on = leaves_disc(path, k, lag_mm);
     return sweep;
 }
 
