@@ -30,13 +30,6 @@ typedef struct {
     int32_t first[SW_LANES], after[SW_LANES];
 } Block;
 
-/* Return the part of a cell that a coordinate lies behind the middle of the one that it is counted from. */
-static float place_in(double at, double origin, double size, int64_t shift, int64_t *to_grid) {
-    const double cells = (at - origin) / size - 0.5, whole = floor(cells);
-    *to_grid = (int64_t)whole - shift;
-    return (float)(cells - whole);
-}
-
 static Lines lines_across(const Grid *grid, const Sweep *sweep) {
     const int64_t rows = grid->height.rows, columns = grid->height.columns - SW_LANES;
     const float dx = (float)grid->dx_mm, dy = (float)grid->dy_mm, ex = (float)sweep->ex, ey = (float)sweep->ey;
@@ -119,9 +112,11 @@ static void lower_block(const Grid *grid, const Lines *lines, const Sweep32 *swe
         for (int64_t lane = 0; lane < count; lane++) {
             const int64_t cell = block->first[lane] + step + lines->shift_p;
             const int64_t at = (begin + lane) * lines->step_q + cell * lines->step_p;
+            COUNT(AT(grid->counted, LOOKED_AT), block->first[lane] + step < block->after[lane]);
             if (lows[lane] < INFINITY && lows[lane] < AT(height, at)) {
                 AT(height, at) = lows[lane];
                 AT(wall, at) = -1;
+                COUNT(AT(grid->counted, LOWERED), 1);
             }
         }
     }
