@@ -1,9 +1,7 @@
-"""How a part comes about, coarse enough to be shown: what stands at any time, which sample left it, which way
-it faces.
+"""How a part comes about, coarse enough to be shown: what stands when, what left it, and which way it faces.
 
-The motion is cut out of a field of some cells to a block; a block has their mean height, so that the volume is
-that of the cells. The error of a surface is the part of the tip's deviation along its normal, at the sample
-that left it.
+The motion is cut out of a field with several cells to a block. A block has their mean height, so that the
+volume is that of the cells.
 """
 
 import math
@@ -14,7 +12,6 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.core import (
-    FLOATS32,
     INT,
     INTS32,
     OUT_FLOATS32,
@@ -48,7 +45,11 @@ _cut = core_function(
 
 
 def history_of(
-    toolpath: Toolpath, motion: Motion, cell: Cell, most_blocks: int = MOST_BLOCKS, most_events: int = MOST_EVENTS
+    toolpath: Toolpath,
+    motion: Motion,
+    cell: Cell,
+    most_blocks: int = MOST_BLOCKS,
+    most_events: int = MOST_EVENTS,
 ) -> PartHistory:
     """Return how the part comes about along a motion.
 
@@ -158,13 +159,15 @@ def _cut_out(
 def _surface(
     grid: Grid, path: Path, side: int, last: Ints32, mean_mm: np.ndarray, origin_mm: Floats, size_mm: Floats
 ) -> tuple[Ints32, Floats]:
-    """Return for each block (r, c) the point whose sweep left its surface, and the normal (r, c, 3) out of it.
+    """Return for each block (r, c) the point whose sweep left its surface, and its normal (r, c, 3).
 
     A block that a wall runs through faces as the wall does.
     """
     point, normal = last.copy(), np.full((*last.shape, 3), np.nan)
     row, column = np.nonzero(last >= 0)
-    place = np.stack([*(origin_mm + (np.stack([column, row], axis=1) + 0.5) * size_mm).T, mean_mm[row, column]], axis=1)
+    place = np.stack(
+        [*(origin_mm + (np.stack([column, row], axis=1) + 0.5) * size_mm).T, mean_mm[row, column]], axis=1
+    )
     normal[row, column] = _floor_normals(path, last[row, column], place)
     cell_row, cell_column, sweep, towards = _walls(grid, path)
     order = np.argsort(sweep, kind="stable")  # the last one counts

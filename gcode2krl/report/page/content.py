@@ -25,10 +25,11 @@ from gcode2krl.report.page.losses import (
     worst_windows,
 )
 from gcode2krl.report.page.packing import packed, packed_text
-from gcode2krl.report.page.part import drawn_part
+from gcode2krl.report.page.part import drawn_part, worst_of_cells
 from gcode2krl.report.page.passes import passes_of
 from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
+from gcode2krl.report.part_error import error_on
 from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import PartHistory, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
@@ -157,7 +158,7 @@ def content_of(
     meshes_mm : name of an obstacle → its triangles (t, 3, 3) in its frame; those left out are not drawn.
     nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
-        ``triangles_mm`` (t, 3, 3). None where nobody compared.
+        ``triangles_mm`` (t, 3, 3), and ``above_mm`` (r, c) over the whole part. None where nobody compared.
     part : how the part comes about, None where nothing is cut or that is not known.
     """
     listed = tuple(prediction.issues if issues is None else issues)
@@ -319,11 +320,8 @@ def _with_part(
     nominal: dict[str, Any] | None,
 ) -> Content:
     """Return a page with the part as it is cut."""
-    error_mm = None
-    if prediction.deflection is not None:
-        error_mm = part.error_mm(prediction.deflection.deflection_base_mm)
-    above_mm = None if nominal is None else nominal["above_mm"]
-    head, events, cells = drawn_part(part, thinned(whole), error_mm, above_mm)
+    above_mm = None if nominal is None else worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
+    head, events, cells = drawn_part(part, thinned(whole), error_on(part, prediction), above_mm)
     return replace(content, head=content.head | {"part": head}, part=events, part_cells=cells)
 
 

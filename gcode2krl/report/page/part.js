@@ -4,12 +4,12 @@ const UNCUT = [205, 192, 160], CUT = [196, 203, 210], NOT_YET = [222, 226, 230],
 const OFF = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"];  // blue: too much is cut
 const PART_WORDS = { error: "error by deflection (mm)", nominal: "above the nominal part (mm)", force: "force (N)", tool: "tool", plain: "" };
 
-// Vertices are cells, with two more around: the edge of the stock, and its foot. What lies behind the section is
+// The fourth colour is a weight: walls are narrow, and shall be seen. Vertices are cells, with two more around: the edge of the stock, and its foot. What lies behind the section is
 // drawn onto it.
 const PART_VERTEX = `
 precision highp int; precision highp sampler2D;
 uniform sampler2D heights, colours; uniform vec2 low, size; uniform ivec2 cells; uniform float foot; uniform vec3 cut;
-out vec3 place, seen, tint;
+out vec3 place, seen; out vec4 tint;
 vec2 at(ivec2 k) { return low + size * clamp(vec2(k) - 1.5, vec2(0.0), vec2(cells)); }
 ivec2 cell(ivec2 k) { return clamp(k - 2, ivec2(0), cells - 1); }
 float height(ivec2 k) {
@@ -30,13 +30,14 @@ void main() {
     xy[axis] = cut[axis];
   }
   place = vec3(xy, min(z, cut.z));
-  tint = texelFetch(colours, cell(k), 0).rgb;
+  tint = texelFetch(colours, cell(k), 0);
+  tint.rgb *= tint.a;
   vec4 world = modelMatrix * vec4(place, 1.0);
   seen = world.xyz;
   gl_Position = projectionMatrix * viewMatrix * world;
 }`;
 const PART_FRAGMENT = `
-uniform vec3 cut; uniform float foot, fine; in vec3 place, seen, tint; out vec4 painted;
+uniform vec3 cut; uniform float foot, fine; in vec3 place, seen; in vec4 tint; out vec4 painted;
 void main() {
   vec3 across = cross(dFdx(seen), dFdy(seen)), side = normalize(cross(dFdx(place), dFdy(place)));
   vec3 normal = normalize(across);
@@ -46,7 +47,7 @@ void main() {
   bool isCut = (gap.x < fine && abs(side.x) > 0.9) || (gap.y < fine && abs(side.y) > 0.9) || (gap.z < fine && abs(side.z) > 0.9);
   float stripe = mod(place.x + place.y + place.z, 40.0 * fine) < 12.0 * fine ? 0.62 : 0.74;
   float light = 0.58 + 0.42 * max(dot(normal, normalize(vec3(-1.0, -2.0, 3.0))), 0.0);
-  painted = vec4(isCut ? vec3(stripe) : tint * light, 1.0);
+  painted = vec4(isCut ? vec3(stripe) : tint.rgb / tint.a * light, 1.0);
 }`;
 
 class Part {
@@ -142,6 +143,7 @@ class Part {
     this.mesh.visible = quantity !== "";
     if (stock) stock.visible = quantity === "" && byId("show-stock").checked;
     byId("part-legend").hidden = quantity === "";
+    document.querySelector(".legend").hidden = scene.hidesPath;
     if (quantity === "") return;
     this.cutUpTo(this.isFinished ? this.order.length : this.upTo[row + 1]);
     if (this.drawn === this.done) return;
@@ -166,7 +168,7 @@ class Part {
   }
 
   paint(quantity) {
-    const { event, row, lastOf } = this, data = this.colours.image.data, { columns } = this.page;
+    const { event, row, lastOf } = this, { steep } = this.cells, data = this.colours.image.data, { columns } = this.page;
     const off = this.cells[quantity], end = head.part.ends[quantity];
     const scale = head.quantities.find(({ name }) => name === quantity);
     const palette = tableOf(off ? OFF : head.palette);
@@ -179,7 +181,7 @@ class Part {
       else if (scale) colour = palette[Math.round(255 * Math.max(shadeOf(scale, columns[quantity][row[one]]), 0))];
       else if (off && one !== lastOf[cell]) colour = NOT_YET;
       else if (off) colour = Number.isNaN(off[cell]) ? NOT_KNOWN : palette[Math.round(127.5 * (1 + Math.min(Math.max(off[cell] / end, -1), 1)))];
-      data[4 * cell] = colour[0]; data[4 * cell + 1] = colour[1]; data[4 * cell + 2] = colour[2]; data[4 * cell + 3] = 255;
+      data[4 * cell] = colour[0]; data[4 * cell + 1] = colour[1]; data[4 * cell + 2] = colour[2]; data[4 * cell + 3] = one < 0 ? 6 : 50 + 205 * (steep[cell] || 0);
     }
     this.colours.needsUpdate = true;
   }

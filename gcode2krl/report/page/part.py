@@ -6,12 +6,11 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.report.page.packing import packed
+from gcode2krl.report.part_error import scale_end
 from gcode2krl.tables import PartHistory
 
 _HEIGHT_STEP_MM = 0.01
 _OFF_STEP_MM = 1e-3
-_MOST_OF_CELLS = 99.5
-_STEPS_MM = (0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 
 
 class DrawnPart(NamedTuple):
@@ -37,11 +36,13 @@ def drawn_part(
     columns["height"] = (history.height_mm, _HEIGHT_STEP_MM)
     events, of_events = packed({name: (values[order], step) for name, (values, step) in columns.items()})
     maps = {"error": error_mm, "nominal": nominal_mm}
-    drawn = {name: off for name, off in maps.items() if off is not None and np.isfinite(off).any()}
+    drawn = {name: off for name, off in maps.items() if off is not None}
     left = np.where(history.left_by >= 0, _row(rows, history.left_by), -1)
+    steep = 1.0 - np.abs(history.normal[:, :, 2])
     of_cells: dict[str, tuple[Any, float]] = {
         "raw": (history.raw_mm.ravel(), _HEIGHT_STEP_MM),
         "left": (left.ravel(), 1.0),
+        "steep": (steep.ravel(), 0.1),
     }
     cells, described = packed(of_cells | {name: (off.ravel(), _OFF_STEP_MM) for name, off in drawn.items()})
     frame = np.eye(4)
@@ -54,9 +55,21 @@ def drawn_part(
         "bottom": history.bottom_mm,
         "events": {"columns": of_events, "rows": len(order)},
         "columns": described,
-        "ends": {name: _end_of(off) for name, off in drawn.items()},
+        "ends": {name: scale_end(off) for name, off in drawn.items()},
     }
     return DrawnPart(head, events, cells)
+
+
+def worst_of_cells(off_mm: Floats, shape: tuple[int, ...]) -> Floats:
+    """Return in each of ``shape`` (r, c) cells that of the finer cells' values which is farthest from 0."""
+    places = [
+        (np.arange(count) + 0.5) / count * wanted for count, wanted in zip(off_mm.shape, shape, strict=True)
+    ]
+    row, column = np.meshgrid(*(place.astype(np.int64) for place in places), indexing="ij")
+    worst = np.zeros((2, *shape))
+    np.maximum.at(worst[0], (row, column), off_mm)
+    np.minimum.at(worst[1], (row, column), off_mm)
+    return np.where(worst[0] >= -worst[1], worst[0], worst[1])
 
 
 def _row(rows: Ints, sample: Ints) -> Ints:
@@ -75,9 +88,3 @@ def _by_visit(cell: Ints) -> Ints:
     visit = np.empty(len(cell), dtype=np.int64)
     visit[order] = place - np.maximum.accumulate(np.where(begins, place, 0))
     return np.lexsort((cell, visit))
-
-
-def _end_of(off_mm: Floats) -> float:
-    """Return where a scale ends that nearly all cells are within."""
-    most = float(np.nanpercentile(np.abs(off_mm), _MOST_OF_CELLS))
-    return next((step for step in _STEPS_MM if step >= most), _STEPS_MM[-1])
