@@ -172,7 +172,11 @@ def _surface(
     cell_row, cell_column, sweep, towards = _walls(grid, path)
     order = np.argsort(sweep, kind="stable")  # the last one counts
     row, column = cell_row[order] // side, cell_column[order] // side
-    point[row, column], normal[row, column] = sweep[order], towards[order]
+    step = np.rint(towards[order]).astype(np.int64) * (last[row, column] < 0)[:, None]  # it ends at a border
+    row, column = (np.clip(at + step[:, k], 0, last.shape[1 - k] - 1) for k, at in ((1, row), (0, column)))
+    is_cut = last[row, column] >= 0
+    row, column = row[is_cut], column[is_cut]
+    point[row, column], normal[row, column] = sweep[order][is_cut], towards[order][is_cut]
     return point, normal
 
 
