@@ -3,8 +3,9 @@
 ``python benchmarks/report_page.py [--lines 66500] [--browser /usr/bin/chromium] [--keep FOLDER]`` predicts a
 raster of so many lines (three samples a line), writes its page and opens it in a headless browser through
 playwright. Printed are the time to make the page, its size and what of it is data and libraries, the first
-paint, the time until everything can be used, and frames per second while the view turns and while the robot
-moves along the path, with the renderer: without a graphics card the browser draws by software on the
+paint, the time until everything can be used, frames per second while the view turns and while the robot
+moves along the path, and how long a jump to another second takes until it is drawn, with the part and with the
+path, with the renderer: without a graphics card the browser draws by software on the
 machine's cores, so that only the same machine can be compared. Without playwright or browser the size alone
 is printed.
 """
@@ -23,8 +24,10 @@ from make_raster import long_raster  # noqa: E402 - from the examples
 from gcode2krl import predict  # noqa: E402
 from gcode2krl.report.page import content_of, page  # noqa: E402
 from gcode2krl.report.page.one_file import LIBRARIES  # noqa: E402
+from gcode2krl.translation.page import part_of  # noqa: E402
 
 SECONDS = 4.0
+JUMPS = 40
 TURNING = """async (seconds) => {
   const { scene } = window.report, axis = { x: 0, y: 0, z: 1 };
   const frame = () => new Promise(requestAnimationFrame);
@@ -54,6 +57,25 @@ PLAYING = """async (seconds) => {
   window.report.play(false);
   return [rate, scene.drawn];
 }"""
+JUMPING = """(jumps) => {
+  const { scene, columns, rows } = window.report, end = columns.time[rows - 1], took = [];
+  const gl = scene.renderer.getContext();
+  for (let k = 0; k < jumps; k++) {
+    const start = performance.now();
+    const wanted = (end * ((k * 7919) % 1000)) / 1000;
+    window.report.select(Math.max(columns.time.findIndex((time) => time >= wanted), 0));
+    scene.draw(start);
+    gl.readPixels(0, 0, 1, 1, 6408, 5121, new Uint8Array(4));
+    took.push(performance.now() - start);
+  }
+  took.sort((a, b) => a - b);
+  return [took[jumps >> 1], took[jumps - 1]];
+}"""
+SHOWN = """([path, finished]) => {
+  const tick = (id, on) => { const box = document.getElementById(id); if (box && box.checked !== on) box.click(); };
+  tick("show-path", path);
+  tick("show-finished", finished);
+}"""
 RESTING = """async () => {
   const { scene } = window.report;
   await new Promise((done) => setTimeout(done, 800));
@@ -73,11 +95,14 @@ def main() -> None:
         prediction = predict(part)
         file = place / f"raster_{asked.lines}.html"
         start = time.perf_counter()
-        content = content_of(prediction, text=part.read_text(encoding="ascii"))
+        history = part_of(prediction)
+        print(f"part cut in {time.perf_counter() - start:.2f} s, {len(history.cell)} events")
+        start = time.perf_counter()
+        content = content_of(prediction, text=part.read_text(encoding="ascii"), part=history)
         file.write_text(page(content), encoding="utf-8")
         print(f"{asked.lines} lines, {content.head['all']} samples, {content.head['rows']} drawn")
         print(f"made in {time.perf_counter() - start:.2f} s")
-        say_size(file, len(content.data), len(content.text))
+        say_size(file, len(content.data), len(content.text), len(content.part) + len(content.part_cells))
         browse(file, asked.browser)
 
 
@@ -89,10 +114,11 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def say_size(file: Path, data: int, text: int) -> None:
+def say_size(file: Path, data: int, text: int, part: int) -> None:
     libraries = sum(one.stat().st_size for one in LIBRARIES.iterdir())
     print(
         f"{file.stat().st_size / 1e6:.2f} MB: samples {data / 1e6:.2f}, G-code {text / 1e6:.2f}, "
+        f"part {part / 1e6:.2f}, "
         f"libraries {libraries / 1e6:.2f}"
     )
 
@@ -117,9 +143,13 @@ def browse(file: Path, browser: str) -> None:
         paint_ms = window.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
         print(f"first paint {paint_ms:.0f} ms, everything there {ready_ms:.0f} ms")
         print(f"drawn by {window.evaluate(RENDERER)}")
-        for what, script in (("turning", TURNING), ("playing", PLAYING)):
-            rate, drawn = window.evaluate(script, SECONDS)
-            print(f"{what}: {rate:.0f} frames/s, {drawn} segments")
+        for shown, path in (("part", False), ("part and path", True)):
+            window.evaluate(SHOWN, [path, False])
+            for what, script in (("turning", TURNING), ("playing", PLAYING)):
+                rate, drawn = window.evaluate(script, SECONDS)
+                print(f"{shown}, {what}: {rate:.0f} frames/s, {drawn if path else 0} segments")
+            usual_ms, longest_ms = window.evaluate(JUMPING, JUMPS)
+            print(f"{shown}, a jump: {usual_ms:.0f} ms, at most {longest_ms:.0f} ms")
         took_ms, drawn = window.evaluate(RESTING)
         print(f"at rest: one frame of {drawn} segments in {took_ms:.0f} ms")
         opened.close()

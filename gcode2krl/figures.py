@@ -24,6 +24,7 @@ _NEEDS = {
     "deflection": ("motion", "deflection"),
     "deflection_path": ("motion", "deflection"),
     "deflection_joints": ("motion", "joints", "forces", "deflection"),
+    "part": ("motion", "forces"),
 }
 """Figure to the stages that it draws."""
 _REMEDIES = {
@@ -50,6 +51,7 @@ def figure_of(prediction: Prediction, name: str) -> "Figure":
         "deflection": _deflection,
         "deflection_path": _deflection_path,
         "deflection_joints": _deflection_joints,
+        "part": _part,
     }[name]
     return shown_in_notebooks(draw(prediction))
 
@@ -148,6 +150,14 @@ def _deflection_joints(prediction: Prediction) -> "Figure":
     assert prediction.motion is not None
     names, share_mm = _shares(prediction)
     return share_figure(prediction.toolpath, prediction.motion, names, share_mm)
+
+
+def _part(prediction: Prediction) -> "Figure":
+    from gcode2krl.cutting import history_of
+    from gcode2krl.report.part import part_figure
+
+    assert prediction.motion is not None
+    return part_figure(prediction, history_of(prediction.toolpath, prediction.motion, prediction.cell))
 
 
 def _shares(prediction: Prediction) -> tuple[tuple[str, ...], Floats]:

@@ -430,6 +430,49 @@ class Deflection(Table):
         return f"{len(self)} samples, up to {_most(lengths(self.deflection_base_mm), 1.0, '.3g')} mm"
 
 
+class PartHistory(NamedTuple):
+    """How a part comes about, in cells (r, c) of a field normal to the tool axis; row = y, column = x."""
+
+    to_field: Floats
+    """(3, 3) rotation from ``$BASE`` to the frame of the field, whose z is the tool axis."""
+    origin_mm: Floats
+    """(2,) low corner."""
+    cell_mm: Floats
+    """(2,) size of a cell along x and y."""
+    bottom_mm: float
+    raw_mm: Floats
+    """(r, c) mean height of the material over each cell before the first cut."""
+    cell: Ints32
+    """(e,) events in the order of time: a cell, row by row, got lower,"""
+    sample: NDArray[np.int64]
+    """(e,) by this row of the Motion, which lowered it,"""
+    height_mm: Floats
+    """(e,) to this mean height."""
+    left_by: NDArray[np.int64]
+    """(r, c) the row of the Motion that left the finished surface, -1 where nothing was cut."""
+    normal: Floats
+    """(r, c, 3) unit normal out of the finished surface along ``$BASE``, NaN where nothing was cut."""
+
+    def heights_mm(self, sample: int | None = None) -> Floats:
+        """Return the heights (r, c) at a row of the Motion; default: of the finished part."""
+        heights = self.raw_mm.copy()
+        done = len(self.cell) if sample is None else int(np.searchsorted(self.sample, sample, side="right"))
+        heights.ravel()[self.cell[:done]] = self.height_mm[:done]  # of several the last one counts
+        return heights
+
+    def volume_mm3(self, sample: int | None = None) -> float:
+        """Return the volume that stands at a row of the Motion; default: of the finished part."""
+        return float((self.heights_mm(sample) - self.bottom_mm).sum() * self.cell_mm.prod())
+
+    def error_mm(self, deviation_mm: Floats) -> Floats:
+        """Return how far the finished surface (r, c) is off along its normal; above 0 material is left.
+
+        ``deviation_mm`` (m, 3) of the tip along ``$BASE``. NaN where nothing was cut.
+        """
+        off: Floats = np.einsum("ijk,ijk->ij", self.normal, deviation_mm[self.left_by])
+        return off
+
+
 _MOST_LETTERS = 60
 """Of the name of a program where a table is shown on one line."""
 

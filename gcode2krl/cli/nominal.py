@@ -109,10 +109,10 @@ def solids(comparison: "Comparison") -> dict[str, bytes]:
 
 
 def on_page(comparison: "Comparison") -> dict[str, Any]:
-    """Return what the report shows: the same, with nearest samples and the corners of triangles (t, 3, 3)."""
+    """Return what the report shows: the same, with nearest samples, corners of triangles (t, 3, 3), a map."""
     import numpy as np
 
     plain = as_dict(comparison)
     for one, shown in zip(comparison.differences, plain["differences"], strict=True):
         shown |= {"row": one.row, "triangles_mm": np.asarray(one.solid.triangles)}
-    return plain
+    return plain | {"above_mm": comparison.above_mm}

@@ -10,7 +10,7 @@ from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import existing
 from gcode2krl.cli.nominal import HASH_KEY, KEY, compared, on_page
 from gcode2krl.errors import Gcode2KrlError, input_error
-from gcode2krl.translation.page import require_report, stock_corners_mm, text_of
+from gcode2krl.translation.page import part_of, require_report, stock_corners_mm, text_of
 
 if TYPE_CHECKING:
     from gcode2krl.prediction import Prediction
@@ -60,8 +60,9 @@ def command(
             mesh = _nominal_file(prediction, place, nominal)
             beside = on_page(compared(prediction, mesh)) if mesh is not None else None
             meshes_mm = obstacle_meshes(prediction.cell)
+            part = part_of(prediction)
             content = content_of(
-                prediction, text=text, stock_mm=stock_mm, meshes_mm=meshes_mm, nominal=beside
+                prediction, text=text, stock_mm=stock_mm, meshes_mm=meshes_mm, nominal=beside, part=part
             )
             write_page(content, file, files)
     except Gcode2KrlError as error:

@@ -2,6 +2,7 @@
 
 from gcode2krl.cutting.entry import depth_in_material, highest_below
 from gcode2krl.cutting.force import ToolLoad, cutting_load, mean_force
+from gcode2krl.cutting.history import history_of
 from gcode2krl.cutting.milling import (
     Approach,
     Contact,
@@ -31,6 +32,7 @@ __all__ = [
     "depth_in_material",
     "force_basis",
     "highest_below",
+    "history_of",
     "mean_cut",
     "mean_force",
     "no_forces",

@@ -60,6 +60,9 @@ class Comparison:
     """Number of smaller ones that are not made into solids."""
     volume_mm3: dict[Kind, float]
     """Of all, also of those left out."""
+    above_mm: Floats
+    """(r, c) by how much the cells of the finished part are above the nominal one, below 0 in gouges; 0 where
+    they do not differ for sure."""
 
 
 def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Comparison:
@@ -87,7 +90,8 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
             cut = _part_of(removal.part, rows, columns)
             pair = judged[rows, columns], want[rows, columns]
             differences.append(_difference(kind, volumes[number], cut, mask, *pair, removal, motion))
-    return Comparison(tuple(differences), left_out, volume_mm3)
+    above_mm = kinds[1][1] - kinds[0][1]
+    return Comparison(tuple(differences), left_out, volume_mm3, above_mm)
 
 
 def _heights(part: HeightField, nominal: "trimesh.Trimesh") -> tuple[Floats, Floats]:

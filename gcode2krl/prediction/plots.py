@@ -101,6 +101,14 @@ class Plots:
         """
         return self._draw("deflection_joints")
 
+    def part(self) -> "Figure":
+        """Draw the finished part from three sides, coloured by the error that the deflection leaves on it.
+
+        >>> from gcode2krl import Prediction
+        >>> Prediction.load("prediction").plot.part().savefig("part.png")
+        """
+        return self._draw("part")
+
 
 FIGURES = (
     "path",
@@ -113,5 +121,6 @@ FIGURES = (
     "deflection",
     "deflection_path",
     "deflection_joints",
+    "part",
 )
 """Names of the figures, in the order in which the command writes them."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from gcode2krl.arrays import Floats
     from gcode2krl.cell import Cell
     from gcode2krl.prediction import Prediction
-    from gcode2krl.tables import Toolpath
+    from gcode2krl.tables import PartHistory, Toolpath
 
 _LARGEST_TEXT = 400_000_000
 _GZIP = b"\x1f\x8b"
@@ -44,6 +44,7 @@ def write_page_of_written(
         text=text_of(part),
         stock_mm=stock_mm,
         meshes_mm=obstacle_meshes(prediction.cell),
+        part=part_of(prediction),
     )
     write_page(content, page, inputs)
 
@@ -76,6 +77,7 @@ def write_page_of_refused(
             text=text,
             stock_mm=stock_mm,
             meshes_mm=obstacle_meshes(prediction.cell),
+            part=part_of(prediction),
         )
     else:
         content = content_of_refused(
@@ -110,6 +112,21 @@ def _predicted(
 
     try:
         return predict_toolpath(toolpath, cell, simplify_mm=simplify_mm)
+    except Gcode2KrlError:
+        return None
+
+
+def part_of(prediction: "Prediction") -> "PartHistory | None":
+    """Return how the part comes about, None where nothing is cut or where that is not known."""
+    import numpy as np
+
+    from gcode2krl.cutting import history_of
+
+    motion, forces = prediction.motion, prediction.forces
+    if motion is None or forces is None or not np.isfinite(forces.phi_rad[:, 0]).any():
+        return None
+    try:
+        return history_of(prediction.toolpath, motion, prediction.cell)
     except Gcode2KrlError:
         return None
 

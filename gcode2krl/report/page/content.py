@@ -1,14 +1,11 @@
 """What the page shows, from the tables of a prediction or from what is known of a refused program."""
 
-import zlib
-from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
@@ -27,57 +24,15 @@ from gcode2krl.report.page.losses import (
     worst_places,
     worst_windows,
 )
+from gcode2krl.report.page.packing import packed, packed_text
+from gcode2krl.report.page.part import drawn_part, worst_of_cells
 from gcode2krl.report.page.passes import passes_of
 from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
+from gcode2krl.report.part_error import error_on
 from gcode2krl.report.tool_axes import drawn_tools
-from gcode2krl.tables import Toolpath
+from gcode2krl.tables import PartHistory, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
-
-# Columns of numbers as the page carries them: whole multiples of a step, differences, bytes by their
-# weight.
-#
-# Neighbouring samples differ little, so that the upper bytes of the differences are nearly all alike and
-# deflate takes them to almost nothing. `data.js` reads it back.
-
-MISSING = -(2**31)
-"""Stands for a value that is not known (NaN)."""
-_LARGEST = 2.0**30
-_LEVEL = 6
-"""9 saves 3 % of the size and takes twelve times as long."""
-
-
-def packed(columns: Mapping[str, tuple[npt.ArrayLike, float]]) -> tuple[str, list[dict[str, Any]]]:
-    """Return columns of equal length as text in base 64, and the name and step of each in their order.
-
-    Parameters
-    ----------
-    columns : name → values (m,) and the step to which they are rounded, in the values' unit. A step that is
-        too small for 31 bits is made larger.
-    """
-    described, parts = [], []
-    for name, (given, wanted) in columns.items():
-        values = np.asarray(given, dtype=np.float64)
-        present = np.isfinite(values)
-        largest = float(np.abs(values, where=present, out=np.zeros(len(values))).max(initial=0.0))
-        step = max(wanted, largest / _LARGEST)
-        whole = np.full(len(values), MISSING, dtype=np.int64)
-        whole[present] = np.rint(values[present] / step).astype(np.int64)
-        parts.append(_bytes_by_weight(whole))
-        described.append({"name": name, "step": step})
-    return b64encode(zlib.compress(b"".join(parts), _LEVEL)).decode("ascii"), described
-
-
-def packed_text(text: str) -> str:
-    """Return a text compressed and in base 64."""
-    return b64encode(zlib.compress(text.encode("utf-8", "replace"), _LEVEL)).decode("ascii")
-
-
-def _bytes_by_weight(whole: Ints) -> bytes:
-    """Return the differences modulo 2³² of whole numbers (m,): all lowest bytes, then all second, …"""
-    differences = np.diff(whole, prepend=np.zeros(1, dtype=np.int64)) & 0xFFFFFFFF
-    return differences.astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
-
 
 # A mesh with few triangles, to be looked at: what lies in one cell of a grid becomes one corner.
 #
@@ -177,6 +132,8 @@ class Content:
     compared: Compared | None = None
     solids: str = ""
     meshes: str = ""
+    part: str = ""
+    part_cells: str = ""
 
 
 def content_of(
@@ -188,6 +145,7 @@ def content_of(
     stock_mm: Floats | None = None,
     meshes_mm: Mapping[str, Floats] | None = None,
     nominal: dict[str, Any] | None = None,
+    part: PartHistory | None = None,
 ) -> Content:
     """Return the page of a prediction.
 
@@ -200,7 +158,8 @@ def content_of(
     meshes_mm : name of an obstacle → its triangles (t, 3, 3) in its frame; those left out are not drawn.
     nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
-        ``triangles_mm`` (t, 3, 3). None where nobody compared.
+        ``triangles_mm`` (t, 3, 3), and ``above_mm`` (r, c) over the whole part. None where nobody compared.
+    part : how the part comes about, None where nothing is cut or that is not known.
     """
     listed = tuple(prediction.issues if issues is None else issues)
     whole = samples_of(prediction)
@@ -223,7 +182,8 @@ def content_of(
         _facts(prediction),
     )
     made = _with_meshes(_with_tool_axes(made, prediction.toolpath), meshes_mm or {})
-    return made if nominal is None else _with_nominal(made, nominal, whole)
+    made = made if nominal is None else _with_nominal(made, nominal, whole)
+    return made if part is None else _with_part(made, part, prediction, whole, nominal)
 
 
 def content_of_refused(
@@ -350,6 +310,19 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples)
     }
     compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"])
     return replace(content, head=head, solids=solids, compared=compared)
+
+
+def _with_part(
+    content: Content,
+    part: PartHistory,
+    prediction: Prediction,
+    whole: PageSamples,
+    nominal: dict[str, Any] | None,
+) -> Content:
+    """Return a page with the part as it is cut."""
+    above_mm = None if nominal is None else worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
+    head, events, cells = drawn_part(part, thinned(whole), error_on(part, prediction), above_mm)
+    return replace(content, head=content.head | {"part": head}, part=events, part_cells=cells)
 
 
 def _carried(

@@ -48,6 +48,13 @@ async function readMeshes() {
   }));
 }
 
+// How the part comes about, and what is known of its cells.
+async function readPart() {
+  if (!head.part) return null;
+  const { events, columns, cells: [width, depth] } = head.part;
+  return Promise.all([readColumns("part", events.columns, events.rows), readColumns("part-cells", columns, width * depth)]);
+}
+
 async function readLines() {
   if (!head.has_text) return [];
   const lines = new TextDecoder().decode(await inflated("gcode")).split(/\r\n|\n|\r/);

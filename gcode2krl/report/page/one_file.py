@@ -14,7 +14,16 @@ from gcode2krl.version import __version__
 
 HERE = Path(__file__).parent
 LIBRARIES = HERE / "vendor"
-_SCRIPTS = ("data.js", "simplify.js", "lines.js", "scene.js", "robot.js", "plots.js", "listing.js", "page.js")
+_SCRIPTS = ("data.js", "simplify.js", "lines.js", "scene.js", "robot.js", "plots.js", "listing.js")
+_PART_COLOURS = {
+    "error": "error by deflection",
+    "nominal": "above the nominal part",
+    "force": "force",
+    "tool": "tool",
+    "plain": "plain",
+    "": "hidden",
+}
+_COMMENT_OR_MARGIN = re.compile(r"^[ \t]*//.*\n|^[ \t]+", re.MULTILINE)
 _EXPORT = re.compile(r"export\s*\{([^{}]*)\}\s*;?\s*$")
 _BACKTICKS = re.compile("`([^`]+)`")
 _IMPORT = re.compile(r"import\s*\{([^{}]*)\}\s*from\s*['\"]three['\"]\s*;")
@@ -35,12 +44,20 @@ def page(content: Content) -> str:
             base_css=base_css(),
             page_css=_text(HERE / "page.css"),
             plot_css=_text(LIBRARIES / "uPlot.min.css"),
-            script=_script(content.head["rows"] > 0)
+            part_colours=_part_colours,
+            script=_script(content.head["rows"] > 0, bool(content.part))
             if content.head["rows"] or content.head["has_text"]
             else "",
             version=__version__,
         )
     )
+
+
+def _part_colours(content: Content) -> list[tuple[str, str]]:
+    """Return what the part may be coloured by, with words."""
+    drawn = {*content.head["part"]["ends"], *(one["name"] for one in content.head["quantities"])}
+    always = ("tool", "plain", "")
+    return [(name, words) for name, words in _PART_COLOURS.items() if name in drawn or name in always]
 
 
 def base_css() -> str:
@@ -74,9 +91,13 @@ def coded(text: str) -> Markup:
 
 
 @cache
-def _script(has_path: bool) -> str:
-    """Return the scripts as one module, with the libraries where there is a path to draw."""
-    scripts = [_text(HERE / name) for name in _SCRIPTS]
+def _script(has_path: bool, has_part: bool) -> str:
+    """Return the scripts as one module, with the libraries where there is a path to draw.
+
+    Comments and indentation stay behind.
+    """
+    names = (*_SCRIPTS, *(("part.js",) if has_part else ()), "page.js")
+    scripts = [_COMMENT_OR_MARGIN.sub("", _text(HERE / name)) for name in names]
     if not has_path:
         return "\n".join(scripts)
     libraries = [

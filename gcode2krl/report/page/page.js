@@ -3,10 +3,11 @@
 const PASS = "pass";
 
 class Page {
-  constructor(columns, lines, solids, meshes) {
+  constructor(columns, lines, solids, meshes, part) {
     this.columns = columns;
     this.solidColumns = solids;
     this.meshes = meshes;
+    this.partColumns = part;
     this.row = 0;
     this.rows = head.rows;
     this.stretch = null;
@@ -62,6 +63,7 @@ class Page {
       this.solids = solidsOf(head.solids, this.solidColumns);
       scene.scene.add(this.solids);
     }
+    if (head.part) this.part = scene.part = new Part(this, ...this.partColumns);
     byId("show-stock").parentElement.hidden = !this.stock;
     byId("show-robot").parentElement.hidden = !this.robot;
     byId("show-cell").parentElement.hidden = !head.robot?.obstacles.length;
@@ -71,7 +73,8 @@ class Page {
     scene.canvas.addEventListener("click", (event) => {
       if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return;
       const box = scene.canvas.getBoundingClientRect();
-      const row = scene.rowUnder(event.clientX - box.left, event.clientY - box.top);
+      const place = [event.clientX - box.left, event.clientY - box.top];
+      const onPath = scene.hidesPath ? -1 : scene.rowUnder(...place), row = onPath >= 0 || !this.part ? onPath : this.part.rowUnder(...place);
       if (row >= 0) this.select(row);
     });
   }
@@ -99,6 +102,7 @@ class Page {
     while (first > 0 && columns.line[first - 1] === line && this.row - first < 5000) first--;
     while (last < this.rows - 1 && columns.line[last + 1] === line && last - this.row < 5000) last++;
     this.robot?.show(this.row);
+    this.part?.show(this.row);
     this.scene?.showRow(this.row, Math.max(first - 1, 0), last);
     this.plots.mark(this.row);
     this.listing?.choose(line);
@@ -247,7 +251,7 @@ class Page {
   listenToTools() {
     byId("colour").addEventListener("change", () => this.paint());
     byId("show-rapids").addEventListener("change", () => this.paint());
-    byId("show-stock").addEventListener("change", (event) => { this.stock.visible = event.target.checked; this.scene.changed(false); });
+    byId("show-stock").addEventListener("change", (event) => { this.stock.visible = event.target.checked; this.part?.show(this.row); this.scene.changed(false); });
     byId("show-axes")?.addEventListener("change", (event) => { this.axes.visible = event.target.checked; this.scene.changed(false); });
     byId("show-solids")?.addEventListener("change", (event) => { this.solids.visible = event.target.checked; this.scene.changed(false); });
     byId("show-cell").addEventListener("change", (event) => { this.robot.obstacles.visible = event.target.checked; this.scene.changed(false); });
@@ -343,6 +347,6 @@ function say(words) {
 if (typeof DecompressionStream === "undefined") {
   say("This browser is too old for the 3D view, the plots and the G-code: Chrome or Edge 103, Firefox 113, Safari 16.4 or newer shows them.");
 } else {
-  const [columns, lines, solids, meshes] = await Promise.all([readColumns("columns", head.columns, head.rows), readLines(), readSolids(), readMeshes()]);
-  window.report = new Page(columns, lines, solids, meshes);
+  const reads = [readColumns("columns", head.columns, head.rows), readLines(), readSolids(), readMeshes(), readPart()];
+  window.report = new Page(...await Promise.all(reads));
 }

@@ -7,6 +7,7 @@ class Plots {
   constructor(place, columns, onPick, onStretch) {
     Object.assign(this, { place, columns, onPick, onStretch });
     this.time = columns.time;
+    this.work = workSpeed(columns);
     this.range = [this.time[0], this.time[this.time.length - 1]];
     this.whole = [...this.range];
     this.plots = head.quantities.map((quantity, number) => this.plot(quantity, number === head.quantities.length - 1));
@@ -24,7 +25,8 @@ class Plots {
     holder.className = "one";
     const name = holder.appendChild(document.createElement("div"));
     name.className = "name";
-    name.textContent = `${quantity.label} (${quantity.unit})`;
+    const isClipped = quantity.name === "speed" && this.columns.speed.some((speed) => speed > this.top(quantity));
+    name.textContent = `${quantity.label} (${quantity.unit})${isClipped ? ", rapids clipped \u25b4" : ""}`;
     const axis = { stroke: "#3c4650", grid: { stroke: "#e6e9ec", width: 1 }, ticks: { size: 4 }, font: "11px system-ui, sans-serif" };
     const u = new uPlot({
       width: this.place.clientWidth,
@@ -39,7 +41,7 @@ class Plots {
       ],
       hooks: {
         setSelect: [(plot) => this.dragged(plot)],
-        draw: [() => this.place1 !== undefined && this.mark(this.place1)],
+        draw: [(plot) => isClipped && markClipped(plot, this.top(quantity)), () => this.place1 !== undefined && this.mark(this.place1)],
       },
     }, [[], []], holder);
     u.over.addEventListener("mousedown", () => { this.active = u; });
@@ -52,8 +54,11 @@ class Plots {
 
   ends(quantity, low, high) {
     const bottom = quantity.lowIsBad && quantity.name !== "speed" ? Math.min(0, low ?? 0) : 0;
-    return [bottom, Math.max((high ?? 1) * 1.08, bottom + 1e-6)];
+    return [bottom, Math.max(Math.min((high ?? 1) * 1.08, this.top(quantity)), bottom + 1e-6)];
   }
+
+  // Speed is drawn as high as feed moves are, or a feed of 10 mm/s would be a line at the foot of the rapids.
+  top({ name }) { return name === "speed" ? this.work * 1.15 : Infinity; }
 
   // Show the time from start to end, s; the 3D view follows.
   stretch(start, end, isFirst = false) {
@@ -116,6 +121,33 @@ class Plots {
     this.plots.forEach(({ u, isLast }) => u.setSize({ width, height: this.height() + (isLast ? 26 : 0) }));
     this.stretch(...this.range, true);
   }
+}
+
+// The highest speed of feed moves; without any that of all.
+function workSpeed({ speed, pass }) {
+  const highest = (isCounted) => speed.reduce((most, one, i) => (isCounted(i) && one > most ? one : most), 0);
+  return highest((i) => pass[i] >= 0) || highest(() => true);
+}
+
+// A small triangle at the upper edge over each stretch that leaves the plot.
+function markClipped(u, top) {
+  const [times, values] = u.data, pen = u.ctx, half = 4 * devicePixelRatio, y = u.bbox.top;
+  const { min, max } = u.scales.x;
+  pen.save();
+  pen.fillStyle = "#d55e00";
+  let last = -Infinity;
+  for (let i = 0; i < times.length; i++) {
+    if (!(values[i] > top) || times[i] < min || times[i] > max) continue;
+    const x = u.valToPos(times[i], "x", true);
+    if (x - last < 3 * half) continue;
+    last = x;
+    pen.beginPath();
+    pen.moveTo(x - half, y + 1.5 * half);
+    pen.lineTo(x + half, y + 1.5 * half);
+    pen.lineTo(x, y);
+    pen.fill();
+  }
+  pen.restore();
 }
 
 // Time and values of some rows as uPlot takes them: of each pixel's rows the lowest and the highest.

@@ -162,8 +162,9 @@ class Scene {
     this.camera.far = this.camera.near * 200 + 20 * this.extent + 2e4;
     this.camera.updateProjectionMatrix();
     if (isFine && this.isStale) this.fillFine();
-    this.fine.mesh.visible = isFine;
-    this.coarse.mesh.visible = !isFine;
+    this.fine.mesh.visible = isFine && !this.hidesPath;
+    this.coarse.mesh.visible = !isFine && !this.hidesPath;
+    this.part?.detail(!this.moving);
     this.drawn = (isFine ? this.fine : this.coarse).count;
     this.renderer.render(this.scene, this.camera);
     this.frames++;

@@ -6,7 +6,7 @@ from base64 import b64decode
 import numpy as np
 import pytest
 
-from gcode2krl.report.page.content import packed, packed_text
+from gcode2krl.report.page.packing import packed, packed_text
 
 
 def unpacked(text, described, rows):

@@ -1,0 +1,90 @@
+"""The part on the page: heights over time, the sample that left each cell, and how far that is off."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gcode2krl.arrays import Floats, Ints
+from gcode2krl.report.page.packing import packed
+from gcode2krl.report.part_error import scale_end
+from gcode2krl.tables import PartHistory
+
+_HEIGHT_STEP_MM = 0.01
+_OFF_STEP_MM = 1e-3
+
+
+class DrawnPart(NamedTuple):
+    """What a page carries of a part."""
+
+    head: dict[str, Any]
+    events: str
+    cells: str
+
+
+def drawn_part(
+    history: PartHistory, rows: Ints, error_mm: Floats | None, nominal_mm: Floats | None
+) -> DrawnPart:
+    """Return a part as the page takes it; ``rows`` are the samples of the motion that the page has.
+
+    Parameters
+    ----------
+    error_mm, nominal_mm : (r, c) how far the surface is off by the deflection, and how far it is above the
+        nominal part; NaN where that is not known, None where nothing is.
+    """
+    order = _by_visit(history.cell)
+    columns = {"cell": (history.cell, 1.0), "row": (_row(rows, history.sample), 1.0)}
+    columns["height"] = (history.height_mm, _HEIGHT_STEP_MM)
+    events, of_events = packed({name: (values[order], step) for name, (values, step) in columns.items()})
+    maps = {"error": error_mm, "nominal": nominal_mm}
+    drawn = {name: off for name, off in maps.items() if off is not None}
+    left = np.where(history.left_by >= 0, _row(rows, history.left_by), -1)
+    steep = 1.0 - np.abs(history.normal[:, :, 2])
+    of_cells: dict[str, tuple[Any, float]] = {
+        "raw": (history.raw_mm.ravel(), _HEIGHT_STEP_MM),
+        "left": (left.ravel(), 1.0),
+        "steep": (steep.ravel(), 0.1),
+    }
+    cells, described = packed(of_cells | {name: (off.ravel(), _OFF_STEP_MM) for name, off in drawn.items()})
+    frame = np.eye(4)
+    frame[:3, :3] = history.to_field  # its transpose, written column by column
+    head = {
+        "frame": frame.reshape(-1).tolist(),
+        "low": history.origin_mm.tolist(),
+        "size": history.cell_mm.tolist(),
+        "cells": list(history.raw_mm.shape[::-1]),
+        "bottom": history.bottom_mm,
+        "events": {"columns": of_events, "rows": len(order)},
+        "columns": described,
+        "ends": {name: scale_end(off) for name, off in drawn.items()},
+    }
+    return DrawnPart(head, events, cells)
+
+
+def worst_of_cells(off_mm: Floats, shape: tuple[int, ...]) -> Floats:
+    """Return in each of ``shape`` (r, c) cells that of the finer cells' values which is farthest from 0."""
+    places = [
+        (np.arange(count) + 0.5) / count * wanted for count, wanted in zip(off_mm.shape, shape, strict=True)
+    ]
+    row, column = np.meshgrid(*(place.astype(np.int64) for place in places), indexing="ij")
+    worst = np.zeros((2, *shape))
+    np.maximum.at(worst[0], (row, column), off_mm)
+    np.minimum.at(worst[1], (row, column), off_mm)
+    return np.where(worst[0] >= -worst[1], worst[0], worst[1])
+
+
+def _row(rows: Ints, sample: Ints) -> Ints:
+    """Return the first of the page's rows that is not before a sample."""
+    return np.minimum(np.searchsorted(rows, sample), len(rows) - 1)
+
+
+def _by_visit(cell: Ints) -> Ints:
+    """Return the order of events in which all first ones of the cells come first, then all second ones, ….
+
+    Neighbours then differ little, as a tool passes one after the other; this halves their size.
+    """
+    order = np.argsort(cell, kind="stable")
+    begins = np.append(True, np.diff(cell[order]) != 0)[: len(cell)]
+    place = np.arange(len(cell))
+    visit = np.empty(len(cell), dtype=np.int64)
+    visit[order] = place - np.maximum.accumulate(np.where(begins, place, 0))
+    return np.lexsort((cell, visit))

@@ -1,0 +1,140 @@
+"""The part on the page: it carries what the history says, and a page without a part carries nothing of it."""
+
+import zlib
+from base64 import b64decode
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcode2krl import predict
+from gcode2krl.cell import resolve_cell
+from gcode2krl.cutting import remove
+from gcode2krl.report.page import content_of, page, write_page
+from gcode2krl.report.page.part import worst_of_cells
+from gcode2krl.report.part_error import error_on, scale_end
+from gcode2krl.translation.page import part_of
+from tests.conftest import ROOT
+from tests.report.page.browser import opened_browser, opened_page
+
+PIECE = ROOT / "examples" / "test_piece.nc"
+STOCK_MM = [[0.0, -100.0, -30.0], [300.0, 100.0, 0.0]]
+VOLUME = "report.part.volume()"
+FINISHED = (
+    "(on) => { const box = document.getElementById('show-finished'); if (box.checked !== on) box.click(); }"
+)
+
+
+@pytest.fixture(scope="module")
+def prediction():
+    return predict(PIECE, resolve_cell({"based_on": "demonstration", "stock": {"box_mm": STOCK_MM}}))
+
+
+@pytest.fixture(scope="module")
+def history(prediction):
+    return part_of(prediction)
+
+
+@pytest.fixture(scope="module")
+def content(prediction, history):
+    return content_of(prediction, text=PIECE.read_text(encoding="ascii"), part=history)
+
+
+def column(packed, described, name, rows):
+    """What `data.js` reads."""
+    number = [one["name"] for one in described].index(name)
+    weights = np.frombuffer(zlib.decompress(b64decode(packed)), np.uint8).reshape(len(described), 4, rows)
+    whole = np.cumsum(np.ascontiguousarray(weights[number].T).view("<i4")[:, 0], dtype=np.int32)
+    return np.where(whole == -(2**31), np.nan, whole * described[number]["step"])
+
+
+def test_it_carries_every_event_and_the_error(prediction, history, content):
+    head = content.head["part"]
+    count = head["events"]["rows"]
+    row, cell, height = (
+        column(content.part, head["events"]["columns"], name, count) for name in ("row", "cell", "height")
+    )
+    order = np.lexsort((cell, row))
+    wanted = np.lexsort((history.cell, history.sample))
+    assert row[order] == pytest.approx(history.sample[wanted])
+    assert cell[order] == pytest.approx(history.cell[wanted])
+    assert height[order] == pytest.approx(history.height_mm[wanted], abs=0.006)
+    error = column(content.part_cells, head["columns"], "error", history.raw_mm.size)
+    assert error == pytest.approx(error_on(history, prediction).ravel(), abs=6e-4, nan_ok=True)
+
+
+def test_a_page_without_a_cut_carries_no_part(prediction):
+    made = page(content_of(replace(prediction, forces=None, deflection=None)))
+    assert part_of(replace(prediction, forces=None)) is None
+    assert "part-colour" not in made
+    assert "class Part " not in made
+
+
+def test_the_error_of_a_compensated_program_is_not_that_of_its_deflection(prediction, history):
+    assert error_on(history, replace(prediction, inputs={"compensate": "offline"})) is None
+
+
+def test_a_map_keeps_what_is_farthest_off():
+    off_mm = np.array([[0.1, -0.3, 0.0, 0.0], [0.0, 0.2, 0.0, 0.4]])
+    assert worst_of_cells(off_mm, (1, 2)).tolist() == [[-0.3, 0.4]]
+
+
+def test_a_scale_ends_at_a_round_number_beyond_nearly_all():
+    assert scale_end(np.append(np.linspace(-0.18, 0.18, 1000), 7.0)) == 0.2
+
+
+@pytest.fixture(scope="module")
+def window(content, tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "part.html"
+    write_page(content, file)
+    with opened_browser() as browser:
+        made = opened_page(browser, file)
+        yield made
+        assert made.said == []
+
+
+@pytest.mark.browser
+def test_its_volume_is_that_of_the_machined_stock(window, prediction):
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False).part
+    window.evaluate(FINISHED, True)
+    assert window.evaluate(VOLUME) == pytest.approx(left.volume_mm3, rel=0.005)
+
+
+@pytest.mark.browser
+def test_it_follows_the_slider_in_both_directions(window, history):
+    window.evaluate(FINISHED, False)
+    for row in (3000, 5500, 1200, 0):
+        window.evaluate("(row) => report.select(row)", row)
+        assert window.evaluate(VOLUME) == pytest.approx(history.volume_mm3(row), rel=1e-4)
+
+
+@pytest.mark.browser
+def test_a_click_says_which_line_left_the_surface(window, prediction):
+    """In the middle of the slot of line 26, at Y -50."""
+    window.evaluate(FINISHED, True)
+    window.evaluate("document.getElementById('look').scrollIntoView()")
+    window.locator("#show-robot").uncheck()
+    window.locator("[data-view=top]").click()
+    place = """() => {
+      const { scene } = report, box = scene.canvas.getBoundingClientRect();
+      const at = scene.marker.position.clone().set(80, -50, -8.95).project(scene.camera);
+      return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+    }"""
+    window.mouse.click(*window.evaluate(place))
+    row = window.evaluate("report.row")
+    assert prediction.toolpath.source_line[prediction.motion.move[row]] == 26
+    assert abs(prediction.motion.position_mm[row, 0] - 80.0) < 9.0
+    note = window.locator("#part-note").inner_text()
+    assert note.startswith("line 26 · ")
+    assert "error -" in note  # the helix pulls the tool down
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("axis", ["0", "1", "2"])
+def test_a_section_shows_what_lies_behind_it(window, axis):
+    window.locator("#section-axis").select_option(axis)
+    cut = window.evaluate("report.part.material.uniforms.cut.value.toArray()")
+    middle = np.mean(STOCK_MM, axis=0)
+    assert cut[int(axis)] == pytest.approx(middle[int(axis)])
+    window.locator("#section-axis").select_option("")
+    assert min(window.evaluate("report.part.material.uniforms.cut.value.toArray()")) > 1e6
