@@ -1,4 +1,4 @@
-"""Measured slots beside the force law: the author's coefficients, our fit, and each slot predicted from the others.
+"""Measured slots beside the force law: as fitted by their author and by us, and predicted from the others.
 
 The five slots: flat mill of 25 mm, two teeth, 6000/min, 3 mm deep, revolution means of the raw signals at
 github.com/leekunhwee/ForceCalculation. Their author fitted the coefficients of `slot D25 z2` to these slots.
@@ -42,9 +42,9 @@ def fit_of(feeds, *, zeroed=True, in_air=0):
 
 
 def held_out():
-    """Yield for each slot its feed, the error of its prediction from the others, their band, and if it is inside.
+    """Yield for each slot its feed, the error of its prediction from the others, their band, if it is within.
 
-    None instead of a band where the slot is outside the range of the others.
+    It is within where its feed is between those of the others.
     """
     for f_z_mm, measured in MEASURED_N.items():
         others = [feed for feed in MEASURED_N if feed != f_z_mm]

@@ -117,8 +117,8 @@ def compensate(
 def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
     """Raise `RefusedError` where the 90 % band's half-width exceeds half the correction.
 
-    The band of measured coefficients is that of cuts which their fit has not seen (`identify force`); that of a
-    published set covers the sets of its alloy.
+    The band of measured coefficients is that of cuts which their fit has not seen (`identify force`); that of
+    a published set covers the sets of its alloy.
     """
     if deflection.relative_band <= MOST_BAND:
         return

@@ -6,7 +6,7 @@ nuisance parameters: the delay is searched, the zero is solved for with the coef
 zeroed. Intervals are valid for residuals that are correlated in time (Newey & West 1987, Bartlett weights).
 
 They are those of the noise. How far the law itself is off shows on cuts that the fit has not seen: each
-condition of cut is left out in turn and predicted from the others (`_misfit`). The band of the forces is theirs.
+condition of cut is left out in turn and predicted from the others (`_misfit`); the band of forces is theirs.
 """
 
 import math
@@ -228,7 +228,7 @@ def _inverse(normal: Floats) -> tuple[Floats, Bools, int]:
 
     A combination that no row tells takes no number with it that has no part in it.
     """
-    scale = np.sqrt(np.diag(normal))
+    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
     used = scale > 1e-9
     scale = np.where(used, scale, 1.0)
     size, axis = np.linalg.eigh(normal / np.outer(scale, scale))
@@ -239,7 +239,7 @@ def _inverse(normal: Floats) -> tuple[Floats, Bools, int]:
 
 
 def _conditions(cut_N: Floats) -> Ints:
-    """Return the condition of cut (r,) of rows (r, 3, 6), -1 in air; one condition is one force by `_SAME`."""
+    """Return the condition of cut (r,) of rows (r, 3, 6), -1 in air; one condition is one force (`_SAME`)."""
     flat = cut_N.reshape(len(cut_N), -1)
     size = np.linalg.norm(flat, axis=1)
     condition = np.where(size > 0.0, _MOST_CONDITIONS - 1, -1)

@@ -97,7 +97,8 @@ def test_held_out_slots_are_inside_the_band_of_the_others():
 
 def test_the_band_is_that_of_cuts_left_out_and_not_of_noise():
     """The law bends below 0.05 mm, which noise-free means cannot show."""
-    assert fit_of(MEASURED_N).relative_band > 2.0 * fit_of([f for f in MEASURED_N if f > 0.03]).relative_band
+    thicker = fit_of([f_z for f_z in MEASURED_N if f_z > 0.03])
+    assert fit_of(MEASURED_N).relative_band > 1.4 * thicker.relative_band
     assert fit_of([0.075, 0.1]).relative_band >= UNTESTED_BAND
 
 
