@@ -5,18 +5,24 @@ filters and delays together and prints the range beside the defaults' figures; `
 
     python benchmarks/twin_sensitivity.py                 the test piece, about two minutes
     python benchmarks/twin_sensitivity.py --small         ends and defaults only, fewer combinations
+    python benchmarks/twin_sensitivity.py --only depths   over the depth of the grooves, which nobody states
+    python benchmarks/twin_sensitivity.py --only play     section 3.3, over what is not known of the drives
 """
 
 import argparse
 import itertools
+import tempfile
 from pathlib import Path
+
+import numpy as np
 
 from gcode2krl import load_cell
 from gcode2krl.cell.sections import Stock
 from gcode2krl.cell.sections.online import Online
+from gcode2krl.online.depth import depth_by_side
 from gcode2krl.online.judge import judged
 from gcode2krl.online.outcome import figures_of
-from gcode2krl.online.twin import CASES, World, simulate, twin_of
+from gcode2krl.online.twin import CASES, PLAY_DEG, World, simulate, twin_of
 from gcode2krl.pipeline import predict
 
 PART = Path(__file__).resolve().parent.parent / "examples" / "test_piece.nc"
@@ -50,6 +56,19 @@ PLAUSIBLE = {
 """Filters from the weakest that would quiet a sensor at a spindle on; delays of one to three cycles. Kept are
 those with a reaction of 100 to 150 ms, as the paper states."""
 REACTION_S = (0.100, 0.150)
+GROOVE = """T1 M6
+S13000 M3
+G0 G43 H1 Z20
+G0 X-{x_to:g} Y{y_from:g}
+G0 Z2
+G1 Z-{depth_mm:g} F1500
+G1 X{x_to:g} Y{y_to:g}
+G0 Z20
+M5
+M30
+"""
+DEPTHS_MM = (6.0, 8.0, 8.95, 10.0, 12.0, 15.0)
+"""With the published sets of aluminium a full slot gives the paper's 546 N at 8 to 15 mm."""
 
 
 def figures(prediction, changed):
@@ -64,8 +83,6 @@ def figures(prediction, changed):
 
 def reaction_s(changed):
     """Return how long a force step takes to show to 90 % in the robot's movement."""
-    import numpy as np
-
     from gcode2krl.online.compensator import filter_start, filtered
     from gcode2krl.online.plant import reaction
 
@@ -117,6 +134,46 @@ def plausible_range(prediction, small):
     row("most", high)
 
 
+def groove(y_from, y_to, x_to, depth_mm=8.95):
+    """Return the prediction of a groove of the test piece alone, in a block of 40 mm."""
+    text = GROOVE.format(y_from=y_from, y_to=y_to, x_to=x_to, depth_mm=depth_mm)
+    stock = Stock(box_mm=((-20, -20, -30), (20, 20, 0)), resolution_mm=0.4)
+    with tempfile.TemporaryDirectory() as folder:
+        part = Path(folder) / "groove.nc"
+        part.write_text(text, encoding="ascii")
+        return predict(part, load_cell().model_copy(update={"stock": stock}), dt_s=Online().cycle_s)
+
+
+def over_depths():
+    """Print the figures of a groove along x over its depth: the force, and so all figures, lean on that."""
+    print("depth of the groove, force with its 90 % band, largest deviation in mm")
+    print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
+    for depth_mm in DEPTHS_MM:
+        prediction = groove(0.0, 0.0, 45.0, depth_mm)
+        force_N = np.linalg.norm(prediction.forces.force_base_N, axis=1).max()
+        band = prediction.forces.relative_band
+        row(f"{depth_mm:g} mm: {force_N:.0f} N +- {band:.0%}", figures(prediction, {}))
+
+
+def over_play():
+    """Print the share of the depth error removed in a groove along y, where A2 and A3 turn, over the play."""
+    prediction = groove(-32.0, 32.0, 0.0)
+    print("depth error removed in %, and depth achieved over sent: Cartesian, with pilot, axis-specific")
+    for backlash_deg, closed in itertools.product((0.0, *PLAY_DEG), (0.0, 0.5, 1.0)):
+        if backlash_deg == 0.0 and closed:
+            continue
+        twin = twin_of(prediction, Online(), World(backlash_deg=backlash_deg, closed=closed))
+        where = judged(prediction, Online().memory_s)
+        sides = depth_by_side(twin, {case: simulate(twin, case) for case in CASES}, where)
+        for kind, side in sides.items():
+            if side is None:
+                continue
+            words = f"play {60.0 * backlash_deg:.1f}', closed {closed:g}, {kind} ({side['share']:.0%})"
+            removed = "".join(f"{share:>8.1f}" for share in side["removed_percent"].values())
+            achieved = "".join(f"{share:>8.3f}" for share in side["achieved"].values())
+            print(f"  {words:<38}{removed}   {achieved}")
+
+
 def draw(drawn, file):
     """Draw the figures over each changed value."""
     from matplotlib.figure import Figure
@@ -139,8 +196,12 @@ def main():
     )
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--plot", type=Path)
+    parser.add_argument("--only", choices=["depths", "play"])
     options = parser.parse_args()
     cell = load_cell().model_copy(update={"stock": STOCK})
+    if options.only is not None:
+        {"depths": over_depths, "play": over_play}[options.only]()
+        return
     prediction = predict(PART, cell, dt_s=Online().cycle_s)
     print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
     defaults = figures(prediction, {})

@@ -231,6 +231,7 @@ class Block(NamedTuple):
     """(m,) line of the G-code."""
     forces: Forces
     deflection: Deflection | None
+    q_rad: Floats
 
 
 @dataclass(frozen=True)
@@ -334,7 +335,7 @@ class Loads:
                 deflection = compliance.deflect_at(q_rad, qd_rad_s, motion.external, forces, self._cell)
             reached = np.asarray(np.isfinite(q_rad).all(axis=1))
             self._deflection_limit.take(deflection, reached, line)
-        return Block(motion, line, forces, deflection)
+        return Block(motion, line, forces, deflection, q_rad)
 
     def outcome(self) -> Outcome:
         """Return what was found, once the motion has ended."""

@@ -222,7 +222,7 @@ def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Foreca
         tell = begin("material, forces, deflection")
         with closing(run.blocks(blocks_with_joints(course, plan.cell), tell, has_peaks=False)) as blocks:
             for block in blocks:
-                figures.take(block.forces, block.deflection)
+                figures.take(block.forces, block.deflection, block.q_rad)
                 samples.take(block.motion, block.line, block.forces, block.deflection)
     outcome = run.outcome
     known, bends = outcome.force_issues is not None, outcome.deflection_issues is not None
@@ -248,7 +248,7 @@ def forecast_of(prediction: Prediction) -> Forecast:
         samples = PilotSamples(prediction.cell, len(motion))
         line = prediction.toolpath.source_line[motion.move]
         samples.take(motion, line, forces, deflection)
-        loads = load_figures(forces, deflection)
+        loads = load_figures(forces, deflection, prediction.joints.q_rad if prediction.joints else None)
         pilot = samples.force(with_deflection=deflection is not None)
     return Forecast(
         toolpath=prediction.toolpath,

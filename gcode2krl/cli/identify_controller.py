@@ -164,6 +164,12 @@ def _say(result: "Identification", trace: str, console: Console) -> None:
         console.say(_corner_line(corner))
     if len(result.corners) > _MOST_SHOWN:
         console.say(f"             … and {len(result.corners) - _MOST_SHOWN} more, see --json")
+    from gcode2krl.identify.unsettled import QUESTIONS
+
+    console.say("  not settled by this trace; KRL that would, between two exact stops:")
+    for question in QUESTIONS:
+        console.say(f"    {question.what}: {'; '.join(question.run)}")
+        console.say(f"      assumed: {question.assumed}")
 
 
 def _corner_line(corner: "CornerFit") -> str:
@@ -224,7 +230,10 @@ def _record(result: "Identification") -> dict[str, Any]:
         [_section_record(section) for section in result.sections],
         [_corner_record(corner) for corner in result.corners],
     )
-    return dict(zip(_KEYS, values, strict=True))
+    from gcode2krl.identify.unsettled import QUESTIONS
+
+    unsettled = [question._asdict() for question in QUESTIONS]
+    return dict(zip(_KEYS, values, strict=True)) | {"unsettled": unsettled}
 
 
 def _value_and_interval(estimate: "Estimate | None") -> tuple[float | None, list[float] | None]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--prediction", metavar="FOLDER", help="Prediction of the program; default: that of run.toml.")
 @click.option("--plot", metavar="FIGURE.png", help="Draw measured and fitted forces.")
 @click.option("--apply", "apply_to", metavar="CELL.toml", help="Write the coefficients into this cell file.")
+@click.option("--zeroed", is_flag=True, help="The sensor was zeroed in air before the run: fit no zero.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
 @click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
@@ -36,6 +37,7 @@ def command(
     prediction: str | None,
     plot: str | None,
     apply_to: str | None,
+    zeroed: bool,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -44,7 +46,7 @@ def command(
 
     RUN is a folder with run.toml and force.csv. The cutter's engagement comes from the prediction's stock and
     motion; zero and delay of the sensor are fitted too. A coefficient that the run does not determine is
-    refused.
+    refused. The band is that of cuts which the fit has not seen: at least three conditions of cut are needed.
     """
     console = Console(quiet, as_json)
     try:
@@ -53,17 +55,17 @@ def command(
         run, predicted = _inputs(run_folder, prediction)
         console.heading.has_cell(predicted.cell, None)
         with console.stage("fitting"):
-            fit = _fit(run, predicted)
+            fit, ranges = _fit(run, predicted, zeroed)
         files = [_save_figure(fit, Path(plot))] if plot is not None else []
         if not as_json:
-            _say(fit, run_folder, console)
+            _say(fit, ranges, run_folder, console)
         fit.require_all(run_folder)
         if apply_to is not None:
-            files.append(_apply(fit, Path(apply_to), run, predicted.cell))
+            files.append(_apply(fit, ranges, Path(apply_to), run, predicted.cell))
     except Gcode2KrlError as error:
         return console.refused(error, ["coefficients"], run_folder)
     if as_json:
-        return console.record(_record(fit), files=files)
+        return console.record(_record(fit) | ranges, files=files)
     for file in files:
         console.say(f"  wrote      {file}")
     return 0
@@ -91,9 +93,10 @@ def _inputs(run_folder: str, prediction: str | None) -> "tuple[Run, Prediction]"
     return run, predicted
 
 
-def _fit(run: "Run", predicted: "Prediction") -> "ForceFit":
+def _fit(run: "Run", predicted: "Prediction", zeroed: bool) -> "tuple[ForceFit, dict[str, list[float]]]":
+    """Return the fit, and between which f_z and a_p its samples are: keys of ``[material]``."""
     from gcode2krl import frames as fr
-    from gcode2krl.cutting import force_basis
+    from gcode2krl.cutting import cut, force_basis, law
     from gcode2krl.identify.force import fit_force
 
     motion, force, cell = predicted.motion, run.force, predicted.cell
@@ -107,10 +110,16 @@ def _fit(run: "Run", predicted: "Prediction") -> "ForceFit":
             flange_in_tool = cell.tool_matrix(int(motion.tool[0]))[:3, :3].T
             turned = turned @ flange_in_tool
         basis = np.einsum("mba,mbc->mac", turned, basis)
-    return fit_force(motion.time_s, basis, force.time_s, force.force_N)
+    fit = fit_force(motion.time_s, basis, force.time_s, force.force_N, zeroed=zeroed)
+    depth_mm = (predicted.forces or cut(predicted.toolpath, motion, cell)).a_p_mm[fit.rows]
+    teeth = np.array([cell.tool[int(number)].teeth for number in motion.tool[fit.rows]])
+    turning = predicted.toolpath.spindle_rad_s[np.clip(motion.move[fit.rows], 0, len(predicted.toolpath) - 1)]
+    feed_mm = law.feed_per_tooth(motion.speed_mm_s[fit.rows], turning, 1) / teeth
+    between = {"measured_f_z_mm": feed_mm, "measured_a_p_mm": depth_mm}
+    return fit, {key: [float(each.min()), float(each.max())] for key, each in between.items()}
 
 
-def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
+def _say(fit: "ForceFit", ranges: dict[str, list[float]], run_folder: str, console: Console) -> None:
     from gcode2krl.identify.force import NAMES
 
     console.say(f"{run_folder}: {fit.samples} samples in cut")
@@ -120,8 +129,16 @@ def _say(fit: "ForceFit", run_folder: str, console: Console) -> None:
         console.say(f"  {name}        {words}")
     zero = ", ".join(f"{value:.1f}" for value in fit.zero_N)
     console.say(f"  zero       {zero} N; delay {fit.delay_s * MS_PER_S:.1f} ms")
+    console.say(f"  residual   {fit.rms_N:.2f} N rms in cut")
+    (feed_low, feed_high), (depth_low, depth_high) = ranges.values()
     console.say(
-        f"  residual   {fit.rms_N:.2f} N rms in cut; forces known to +- {fit.relative_band:.1%} (90 %)"
+        f"  range      f_z {feed_low:.3f}..{feed_high:.3f} mm, a_p {depth_low:.2f}..{depth_high:.2f} mm; "
+        f"forces there known to +- {fit.relative_band:.1%} (90 %)"
+    )
+    judged = fit.misfit[np.isfinite(fit.misfit)]
+    errors = ", ".join(f"{error:.1%}" for error in judged)
+    console.say(
+        f"  held out   {errors or 'no condition'}: error of each condition, predicted from the others"
     )
 
 
@@ -138,15 +155,17 @@ def _record(fit: "ForceFit") -> dict[str, Any]:
         "delay_s": fit.delay_s,
         "rms_N": fit.rms_N,
         "relative_band": fit.relative_band,
+        "held_out": [float(each) if np.isfinite(each) else None for each in fit.misfit],
         "samples": fit.samples,
     }
 
 
-def _apply(fit: "ForceFit", file: Path, run: "Run", cell: "Cell") -> Path:
+def _apply(fit: "ForceFit", ranges: dict[str, list[float]], file: Path, run: "Run", cell: "Cell") -> Path:
     """Write the coefficients as ``[material]`` into a cell file, keep its other keys; comments are lost."""
     import tomli_w
 
     from gcode2krl.cell import library, resolve_cell
+    from gcode2krl.cell.sections.machining import WIDEST_BAND
     from gcode2krl.files import write_together
     from gcode2krl.identify.force import NAMES
 
@@ -155,7 +174,8 @@ def _apply(fit: "ForceFit", file: Path, run: "Run", cell: "Cell") -> Path:
     data["material"] = {
         "name": material.name if material is not None else "",
         "linear_edge": {name: round(float(value), 3) for name, value in zip(NAMES, fit.value, strict=True)},
-        "relative_band": min(0.99, round(fit.relative_band, 4)),
+        "relative_band": min(WIDEST_BAND, round(fit.relative_band, 4)),
+        **{key: [round(each, 4) for each in pair] for key, pair in ranges.items()},
         "source": f"identified from {run.name}: {fit.samples} samples in cut, residual {fit.rms_N:.1f} N rms",
         "sure": "checked",
     }

@@ -137,6 +137,7 @@ def _table(outcome: dict[str, Any]) -> Iterator[str]:
             yield f"  {words:<42} {'-':>9} {'-':>9}"
             continue
         yield f"  {words:<42} {gain['rms_mm']:>6.3f} mm {largest_mm:>6.3f} mm {gain['worst_line']:>8}"
+    yield from _depth_lines(outcome["depth"])
     gain = outcome["gain"]["pilot"]
     if gain is None or gain["rms_less_percent"] is None or outcome["reduction_percent"] is None:
         return
@@ -145,6 +146,15 @@ def _table(outcome: dict[str, Any]) -> Iterator[str]:
         f"  nearer to nominal {100.0 * gain['better_share']:.0f} % of the time in the cut, "
         f"farther {100.0 * gain['worse_share']:.0f} %{_where(gain['worse'])}"
     )
+
+
+def _depth_lines(depth: dict[str, Any] | None) -> Iterator[str]:
+    """Yield the share of the depth error that each case takes away, by the direction of the correction."""
+    for kind, words in (("with", "with its axis"), ("against", "turning its axis")):
+        side = depth[kind] if depth is not None else None
+        if side is not None:
+            removed = ", ".join(f"{case} {share:.0f} %" for case, share in side["removed_percent"].items())
+            yield f"  depth, correction {words} ({side['share']:.1%} of the cut): {removed} removed"
 
 
 def _less(percent: float) -> str:

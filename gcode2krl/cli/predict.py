@@ -102,6 +102,7 @@ def command(
     from gcode2krl.cli.loads import load_lines
     from gcode2krl.prediction.forecast import load_figures
     from gcode2krl.prediction.limits import cycle_acceleration
+    from gcode2krl.translation.quantities import band_words, quantities
 
     console = Console(quiet, as_json)
     try:
@@ -158,7 +159,9 @@ def command(
     if motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
     forces = prediction.forces
-    loads = load_figures(forces, prediction.deflection) if forces is not None else None
+    q_rad = prediction.joints.q_rad if prediction.joints is not None else None
+    loads = load_figures(forces, prediction.deflection, q_rad) if forces is not None else None
+    known = quantities(loads, float(motion.time_s[-1]), prediction.targets, prediction.cell)
     if as_json:
         return console.record(
             {
@@ -168,6 +171,7 @@ def command(
                 "corner_error_mm": float(corners["error_mm"].max(initial=0.0)),
                 "max_force_N": loads.force_N if loads is not None else None,
                 "max_deflection_mm": loads.deflection_mm if loads is not None else None,
+                "quantities": known,
                 **({"nominal": as_dict(comparison)} if comparison is not None else {}),
                 **project.record,
             },
@@ -184,7 +188,8 @@ def command(
         f"  {len(corners['error_mm'])} corners, off by at most {corners['error_mm'].max(initial=0.0):.4f} mm"
     )
     compared_lines = comparison_lines(comparison) if comparison is not None else ()
-    for line in (*load_lines(loads, prediction.cell), *compared_lines):
+    bands = (f"  band       {words}" for words in band_words(known))
+    for line in (*load_lines(loads, prediction.cell), *bands, *compared_lines):
         console.say(line)
     return 0
 

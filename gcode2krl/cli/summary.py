@@ -11,6 +11,7 @@ from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.krl.external_words import axes_words
 from gcode2krl.prediction.forecast import Forecast
+from gcode2krl.translation.quantities import band_words, quantities
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
@@ -52,6 +53,8 @@ def summary_lines(
     yield from (f"  external   {words}" for words in axes_words(targets, cell))
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"
     yield from load_lines(forecast.loads, cell)
+    known = quantities(forecast.loads, forecast.time_s, targets, cell)
+    yield from (f"  band       {words}" for words in band_words(known))
     yield from _collisions(cell, np.unique(targets.tool).tolist(), is_cut=forecast.has_forces)
 
 

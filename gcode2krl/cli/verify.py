@@ -12,12 +12,14 @@ from gcode2krl.cli.inputs import (
     common_options,
     gcode_options,
     job_option,
+    options_of_project,
     read_cell_under_job,
     simplify_option,
 )
 from gcode2krl.cli.restart import from_line_option, refuse_other_start
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.translation.inputs import read_from_line
+from gcode2krl.translation.project import Project
 
 
 @click.command(
@@ -43,6 +45,7 @@ from gcode2krl.translation.inputs import read_from_line
 )
 @job_option
 @from_line_option
+@options_of_project
 def command(
     program: str,
     part: str,
@@ -62,10 +65,12 @@ def command(
     job_path: str | None,
     tools_path: str | None,
     from_line: int | None,
+    project: Project,
 ) -> int:
     """Read a KRL program back, compare it with its G-code, and judge its hazards anew.
 
-    Use the options the program was made with (its header names them), and the cell that it is to run in.
+    Use the options the program was made with (its header names them), and the cell that it is to run in;
+    those that a gcode2krl.toml states for the part are taken from it.
     Exit code 1 where it differs, where the cell has changed since it was written, or where a hazard is seen.
     """
     console = Console(quiet, as_json)
@@ -87,7 +92,7 @@ def command(
                 dialect=dialect,
                 search=search,
             )
-        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job))
+        toolpath = replace(toolpath, issues=(*toolpath.issues, *of_job, *project.issues))
         prediction = None
         if compensate == "offline":
             from gcode2krl.chain import collect, prepare
@@ -112,7 +117,7 @@ def command(
     if as_json:
         from gcode2krl.restart.rows import restart_record
 
-        figures = {"verify": report.as_dict(), **restart_record(toolpath)}
+        figures = {"verify": report.as_dict(), **project.record, **restart_record(toolpath)}
         console.record(figures, report.issues, exit_code=0 if report.ok else 1)
     else:
         console.findings((issue for issue in report.issues if not issue.file), program)

@@ -34,7 +34,6 @@ _MOST_ROUNDS = 15
 _DIVIDING_ROUNDS = 3
 """After this many rounds lines are divided no further, so that the targets of two rounds compare row by
 row."""
-_IDENTIFIED = ("verified", "checked")
 
 
 @dataclass(frozen=True)
@@ -118,15 +117,14 @@ def compensate(
 def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
     """Raise `RefusedError` where the stiffness is not stated, or the band exceeds half the correction.
 
-    Measured coefficients and stiffness are exempt: the stiffness of robot and end effector must be "verified"
-    or "checked", and so must the material, whose source must say that it was identified. A published set of
-    coefficients may be "verified" as a quotation, which is not a measurement of this material.
+    The band of measured coefficients is that of cuts which their fit has not seen (`identify force`); that of
+    a published set covers the sets of its alloy.
     """
     assumed = compliance.assumed_stiffness(cell)
     if assumed is not None:
         sentence = f"{assumed.message}: a correction by it could make the part worse"
         raise RefusedError(replace(assumed, code="compensation-unsure", message=sentence))
-    if deflection.relative_band <= MOST_BAND or identified(cell):
+    if deflection.relative_band <= MOST_BAND:
         return
     sentence = (
         f"the deflection is known to ± {deflection.relative_band:.0%} only (90 %), a correction needs "
@@ -134,18 +132,6 @@ def refuse_unsure(deflection: Deflection, cell: Cell) -> None:
     )
     remedy = "measure a slot (`gcode2krl identify force`) and the stiffness (`gcode2krl identify stiffness`)"
     raise RefusedError(Issue("error", "compensation-unsure", 0, sentence, remedy))
-
-
-def identified(cell: Cell) -> bool:
-    """Tell whether the cell's force coefficients and stiffness were identified, see `refuse_unsure`."""
-    material = cell.material
-    return (
-        material is not None
-        and material.sure in _IDENTIFIED
-        and "identified" in material.source
-        and cell.compliance.sure in _IDENTIFIED
-        and cell.compliance.robot_sure in _IDENTIFIED
-    )
 
 
 def refuse_twice(online: bool, both: bool) -> None:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.cell.sections import Tool
+from gcode2krl.cell.sections import Material, Tool
 from gcode2krl.compiled.chunks import chunked
 from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
 from gcode2krl.cutting.records import followed, taken
-from gcode2krl.errors import MOST_PLACES, Issue
+from gcode2krl.errors import MOST_PLACES, Issue, Severity
 from gcode2krl.tables import Forces, lengths
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
@@ -139,6 +139,8 @@ _NEAR_MODE = 0.15
 _HARMONICS = 3
 _SHORT_S = 0.1
 """A thin chip that lasts less than this is an entry, an exit or a corner."""
+_BESIDE = 0.02
+"""Feed and depth this little beside the measured range, relative, are within it: predictions are rounded."""
 Judge = Callable[..., None]
 """Takes a code, the samples that are wrong, the value of each, and a tool."""
 
@@ -178,7 +180,7 @@ class Findings:
         self._cell, self._tools, self._guessed = cell, tools, guessed
         self._rapids = RapidContacts(blend_mm)
         self._wrong: dict[tuple[str, int], Stretches] = {}
-        self._chips = _Chips(cycle_s)
+        self._chips = _Chips(cycle_s, cell.material)
         self._speeds: dict[tuple[float, int], None] = {}
         self._first_at: dict[float, int] = {}
 
@@ -371,13 +373,17 @@ def _wide_and_silent(tool: Tool) -> bool:
 
 
 class _Chips:
-    """Chips outside the range of the coefficients: once each, with the fraction of the time in cut."""
+    """Cuts outside the range of the coefficients: once each, with the fraction of the time in cut."""
 
-    def __init__(self, cycle_s: float) -> None:
+    def __init__(self, cycle_s: float, material: Material | None) -> None:
         self._cycle_s = cycle_s
+        self._between = (
+            (material.measured_f_z_mm, material.measured_a_p_mm) if material is not None else (None, None)
+        )
         self._in_cut = 0
-        self._count, self._line = [0, 0], [0, 0]
-        """Of thin chips, of thick ones: how many, and the line of the first."""
+        self._count, self._line = [0, 0, 0], [0, 0, 0]
+        """Of thin chips, thick ones and cuts that were not measured: how many, and the line of the first."""
+        self._beyond: dict[str, tuple[float, float]] = {}
 
     def take(self, cut: Cut, forces: Forces) -> None:
         cutting = cut.engaged & (cut.f_z_mm > 0.0)
@@ -387,24 +393,52 @@ class _Chips:
             return largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
 
         chip_mm = chunked(chips, len(cutting))
-        for kind, wrong in enumerate((chip_mm < THIN_CHIP_MM, chip_mm > THICK_CHIP_MM)):
+        outside = self._outside(cut, forces, cutting)
+        for kind, wrong in enumerate((chip_mm < THIN_CHIP_MM, chip_mm > THICK_CHIP_MM, outside)):
             wrong &= cutting
             count = int(np.count_nonzero(wrong))
             if count and not self._count[kind]:
                 self._line[kind] = int(cut.source_line[np.argmax(wrong)])
             self._count[kind] += count
 
+    def _outside(self, cut: Cut, forces: Forces, cutting: Bools) -> Bools:
+        """Return (m,) True where feed per tooth or depth are not between those that were measured."""
+        outside = np.zeros(len(cutting), dtype=np.bool_)
+        for name, between, values in zip(
+            ("f_z", "a_p"), self._between, (cut.f_z_mm, forces.a_p_mm), strict=True
+        ):
+            if between is None:
+                continue
+            low, high = between[0] * (1.0 - _BESIDE), between[1] * (1.0 + _BESIDE)
+            beyond = cutting & ((values < low) | (values > high))
+            if beyond.any():
+                least, most = self._beyond.get(name, (np.inf, 0.0))
+                self._beyond[name] = (
+                    min(least, float(values[beyond].min())),
+                    max(most, float(values[beyond].max())),
+                )
+            outside |= beyond
+        return outside
+
     def issues(self) -> Iterator[Issue]:
-        kinds = (
-            ("chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut"),
-            ("chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients"),
+        beyond = ", ".join(f"{name} {low:.3f}..{high:.3f} mm" for name, (low, high) in self._beyond.items())
+        change = "change F or the spindle speed"
+        kinds: tuple[tuple[Severity, str, str, str], ...] = (
+            ("note", "chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut", change),
+            ("note", "chip-thick", f"chips above {THICK_CHIP_MM:g} mm: beyond the coefficients", change),
+            (
+                "warning",
+                "force-unmeasured",
+                f"cuts with {beyond}, for which the coefficients were not measured: their band does not hold",
+                "measure such a cut too (`gcode2krl identify force`), or change F and the depth",
+            ),
         )
-        for count, line, (code, words) in zip(self._count, self._line, kinds, strict=True):
+        for count, line, (severity, code, words, remedy) in zip(self._count, self._line, kinds, strict=True):
             if count * self._cycle_s < max(_SHORT_S, 0.05 * self._in_cut * self._cycle_s):
                 continue
             share = count / self._in_cut
             sentence = f"{words}, in {share:.0%} of the time in cut, first at this line"
-            yield Issue("note", code, line, sentence, "change F or the spindle speed")
+            yield Issue(severity, code, line, sentence, remedy)
 
 
 def _runs(*columns: NDArray[Any]) -> Ints:

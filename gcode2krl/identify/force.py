@@ -2,8 +2,11 @@
 
 Measured forces are averaged over the samples of the prediction (nothing faster than a revolution is in the
 model). The delay of the measuring chain and a constant force of each axis (zero of the sensor, weight) are
-nuisance parameters: the delay is searched, the zero is solved for with the coefficients. Intervals are valid
-for residuals that are correlated in time (Newey & West 1987, Bartlett weights).
+nuisance parameters: the delay is searched, the zero is solved for with the coefficients unless the sensor was
+zeroed. Intervals are valid for residuals that are correlated in time (Newey & West 1987, Bartlett weights).
+
+They are those of the noise. How far the law itself is off shows on cuts that the fit has not seen: each
+condition of cut is left out in turn and predicted from the others (`_misfit`); the band of forces is theirs.
 """
 
 import math
@@ -13,7 +16,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.identify.estimate import QUANTILE_90
+from gcode2krl.identify.estimate import QUANTILE_90, student
 
 NAMES = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 LEAST_SAMPLES = 30
@@ -23,6 +26,15 @@ _WIDEST = 0.5
 determined."""
 _MEMORY_S = 0.12
 """Residuals further apart in time count as independent."""
+_SAME = 0.05
+"""Relative difference of the predicted force up to which two samples are of one condition of cut."""
+_MOST_CONDITIONS = 24
+_LEAST_CONDITIONS = 3
+"""Fewer conditions that can be predicted from the others do not tell how far the law is off."""
+_DEGENERATE = 1e-10
+"""Eigenvalue of the scaled normal matrix, relative to the largest, of what the rows do not tell at all."""
+UNTESTED_BAND = 0.4
+"""Band where the data cannot test the law; an assumption."""
 _STEADY = 0.02
 """Relative change of the predicted force over two samples above which a sample is left out: at entries and
 exits an error of the clock or of the stock's place would count as force."""
@@ -43,39 +55,47 @@ class ForceFit:
     rms_N: float
     """Residual of one axis while cutting."""
     relative_band: float
-    """Half-width of the 90 % band of forces with these coefficients, relative."""
+    """Half-width of the 90 % band of forces with these coefficients, relative: the larger one of what noise
+    leaves open and of the misfit on conditions that were left out."""
+    misfit: Floats
+    """(c,) size of the error of the force on each condition of cut, predicted from the others, relative to
+    the prediction; NaN where the others do not determine it."""
+    zero_confounds: bool
+    """True where the coefficients are told only if the sensor's zero is stated, or recorded in air."""
     samples: int
     time_s: Floats
     measured_N: Floats
     fitted_N: Floats
     determined: Bools
+    rows: Ints
+    """(r,) samples of the prediction in a steady cut: the range over which the fit holds is theirs."""
 
     def require_all(self, source: str) -> None:
         """Raise `RefusedError` that names the coefficients which the data do not determine."""
         if self.determined.all():
             return
         missing = ", ".join(name for name, good in zip(NAMES, self.determined, strict=True) if not good)
-        raise RefusedError(
-            Issue(
-                "error",
-                "not-determined",
-                0,
-                f"the data do not determine {missing}",
-                "cut slots at three feeds per tooth at least, from 0.03 to 0.15 mm, at one depth and more",
-            ),
-            source,
-        )
+        sentence = f"the data do not determine {missing}"
+        remedy = "cut slots at three feeds per tooth at least, from 0.03 to 0.15 mm, at one depth and more"
+        if self.zero_confounds:
+            sentence += ": the edges' force cannot be told from the sensor's zero"
+            remedy = (
+                "record the air before or after the cut, or state --zeroed where the sensor was zeroed there"
+            )
+        raise RefusedError(Issue("error", "not-determined", 0, sentence, remedy), source)
 
 
-def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: Floats) -> ForceFit:
+def fit_force(
+    time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: Floats, *, zeroed: bool = False
+) -> ForceFit:
     """Fit the coefficients to a measured force.
 
     Parameters
     ----------
     time_s : (m,) times of the prediction, evenly spaced.
-    basis_N : (m, 3, 6) force that each coefficient brings (`cutting.force_basis`), along the
-        sensor's axes.
-    sensor. measured_s, measured_N : (n,), (n, 3) the force on the tool, on the prediction's clock.
+    basis_N : (m, 3, 6) force that each coefficient brings (`cutting.force_basis`), along the sensor's axes.
+    measured_s, measured_N : (n,), (n, 3) the force on the tool, on the prediction's clock.
+    zeroed : the sensor shows no force in air, so no zero is fitted.
 
     Raises
     ------
@@ -84,7 +104,8 @@ def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: F
     """
     step_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 0.0
     delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + step_s / 2, step_s)
-    trials = [_solve(time_s, basis_N, measured_s, measured_N, float(delay)) for delay in delays]
+    zero = not zeroed
+    trials = [_solve(time_s, basis_N, measured_s, measured_N, float(delay), zero) for delay in delays]
     best = int(np.argmin([trial[0] for trial in trials]))
     delay_s = float(delays[best])
     if 0 < best < len(delays) - 1:  # vertex of the parabola through the three best
@@ -92,7 +113,9 @@ def fit_force(time_s: Floats, basis_N: Floats, measured_s: Floats, measured_N: F
         bend = left - 2.0 * middle + right
         if bend > 0.0:
             delay_s += 0.5 * step_s * (left - right) / bend
-    _, rows, design, wanted, solution = _solve(time_s, basis_N, measured_s, measured_N, delay_s, True)
+    _, rows, design, wanted, solution = _solve(
+        time_s, basis_N, measured_s, measured_N, delay_s, zero, steady_only=True
+    )
     return _fit_of(time_s, rows, design, wanted, solution, delay_s, step_s)
 
 
@@ -102,6 +125,7 @@ def _solve(
     measured_s: Floats,
     measured_N: Floats,
     delay_s: float,
+    zero: bool,
     steady_only: bool = False,
 ) -> tuple[float, Ints, Floats, Floats, Floats]:
     """Return (mean square, rows, design (3r, 9), wanted (3r,), solution (9,)) for one delay."""
@@ -122,7 +146,7 @@ def _solve(
         )
     design = np.zeros((len(rows), 3, 9))
     design[:, :, :6] = basis_N[rows]
-    design[:, [0, 1, 2], [6, 7, 8]] = 1.0
+    design[:, [0, 1, 2], [6, 7, 8]] = float(zero)
     flat, wanted = design.reshape(-1, 9), mean_N.reshape(-1)
     scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
     solution = np.linalg.lstsq(flat / scale, wanted, rcond=1e-8)[0] / scale
@@ -167,31 +191,101 @@ def _fit_of(
     step_s: float,
 ) -> ForceFit:
     residual = (wanted - design @ solution).reshape(-1, 3)
-    used = np.linalg.norm(design, axis=0) > 1e-9
-    covariance = np.full((9, 9), np.inf)
-    normal = design[:, used].T @ design[:, used]
-    if np.linalg.cond(normal / np.outer(*2 * [np.sqrt(np.diag(normal))])) < 1e10:
-        inverse = np.linalg.inv(normal)
-        score = np.einsum("rai,ra->ri", design[:, used].reshape(len(rows), 3, -1), residual)
-        spread = _long_run(score, max(1, round(_MEMORY_S / max(step_s, 1e-6))))
-        covariance[np.ix_(used, used)] = inverse @ spread @ inverse
-    half = np.where(used, QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
+    inverse, told, _ = _inverse(design.T @ design)
+    score = np.einsum("rai,ra->ri", design.reshape(len(rows), 3, 9), residual)
+    spread = _long_run(score, max(1, round(_MEMORY_S / max(step_s, 1e-6))))
+    covariance = inverse @ spread @ inverse
+    half = np.where(told, QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
     fitted = (design @ solution).reshape(-1, 3)
-    in_cut = np.abs(design.reshape(len(rows), 3, 9)[:, :, :6]).max(axis=(1, 2)) > 0.0
+    cut_N = design.reshape(len(rows), 3, 9)[:, :, :6]
+    in_cut = np.abs(cut_N).max(axis=(1, 2)) > 0.0
     typical = np.repeat([np.abs(solution[:3]).max(), np.abs(solution[3:6]).max()], 3)
+    determined = half <= _WIDEST * typical
+    _, told_if_zeroed, _ = _inverse(design[:, :6].T @ design[:, :6])
+    misfit = _misfit(design, wanted, _conditions(cut_N))
     return ForceFit(
         value=solution[:6],
         half=half,
         zero_N=solution[6:],
         delay_s=delay_s,
         rms_N=float(np.sqrt(np.mean(residual[in_cut] ** 2))),
-        relative_band=_band(design, covariance, fitted, in_cut),
+        relative_band=max(
+            _band(design, covariance, fitted, in_cut) if determined.all() else math.inf, _band_of(misfit)
+        ),
+        misfit=misfit,
+        zero_confounds=bool(not determined.all() and design[:, 6:].any() and told_if_zeroed.all()),
         samples=int(np.count_nonzero(in_cut)),
         time_s=time_s[rows],
         measured_N=wanted.reshape(-1, 3),
         fitted_N=fitted,
-        determined=half <= _WIDEST * typical,
+        determined=determined,
+        rows=rows[in_cut],
     )
+
+
+def _inverse(normal: Floats) -> tuple[Floats, Bools, int]:
+    """Return the inverse (p, p) of a normal matrix on what its rows tell, the numbers (p,) told, the rank.
+
+    A combination that no row tells takes no number with it that has no part in it.
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    used = scale > 1e-9
+    scale = np.where(used, scale, 1.0)
+    size, axis = np.linalg.eigh(normal / np.outer(scale, scale))
+    kept = size > _DEGENERATE * size.max(initial=1.0)
+    inverse = (axis[:, kept] / size[kept]) @ axis[:, kept].T / np.outer(scale, scale)
+    told = used & (np.linalg.norm(axis[:, ~kept], axis=1) < 1e-3)
+    return inverse, np.asarray(told), int(np.count_nonzero(kept & (size > 0.0)))
+
+
+def _conditions(cut_N: Floats) -> Ints:
+    """Return the condition of cut (r,) of rows (r, 3, 6), -1 in air; one condition is one force (`_SAME`)."""
+    flat = cut_N.reshape(len(cut_N), -1)
+    size = np.linalg.norm(flat, axis=1)
+    condition = np.where(size > 0.0, _MOST_CONDITIONS - 1, -1)
+    left = size > 0.0
+    for number in range(_MOST_CONDITIONS - 1):
+        if not left.any():
+            break
+        first = int(np.argmax(left))
+        alike = left & (_apart(flat, flat[first]) <= _SAME)
+        condition[alike] = number
+        left &= ~alike
+    return condition
+
+
+def _apart(rows: Floats, row: Floats) -> Floats:
+    """Return by how much rows (r, p) differ from one of them (p,), each column in its own unit."""
+    unit = np.maximum(np.abs(row), 1e-3 * np.abs(row).max())
+    apart: Floats = np.abs((rows - row) / unit).max(axis=1)
+    return apart
+
+
+def _misfit(design: Floats, wanted: Floats, condition: Ints) -> Floats:
+    """Return the relative error (c,) of the mean force of each condition, predicted from all other rows."""
+    normal, right = design.T @ design, design.T @ wanted
+    rank = _inverse(normal)[2]
+    misfit = np.full(int(condition.max(initial=-1)) + 1, np.nan)
+    for number in range(len(misfit)):
+        rows = np.repeat(condition == number, 3)
+        own, seen = design[rows], wanted[rows]
+        rest = normal - own.T @ own
+        inverse, _, told = _inverse(rest)
+        if told < rank:
+            continue
+        solution = inverse @ (right - own.T @ seen)
+        error_N = np.mean((seen - own @ solution).reshape(-1, 3), axis=0)
+        force_N = np.mean((own[:, :6] @ solution[:6]).reshape(-1, 3), axis=0)
+        misfit[number] = np.linalg.norm(error_N) / max(float(np.linalg.norm(force_N)), 1e-9)
+    return misfit
+
+
+def _band_of(misfit: Floats) -> float:
+    """Return the half-width of the 90 % band of another condition's force, from the errors of some (c,)."""
+    judged = misfit[np.isfinite(misfit)]
+    if len(judged) < _LEAST_CONDITIONS:
+        return UNTESTED_BAND
+    return float(student(0.90, len(judged)) * np.sqrt(np.mean(judged**2)))
 
 
 def _long_run(score: Floats, memory: int) -> Floats:
@@ -205,8 +299,6 @@ def _long_run(score: Floats, memory: int) -> Floats:
 
 def _band(design: Floats, covariance: Floats, fitted: Floats, in_cut: Bools) -> float:
     """Return the half-width of the 90 % band of the force, relative to its size, where it is largest."""
-    if not np.isfinite(covariance[:6, :6]).all():
-        return math.inf
     cut = design.reshape(len(in_cut), 3, 9)[in_cut][:, :, :6]
     variance = np.einsum("rai,ij,raj->r", cut, covariance[:6, :6], cut)
     size = np.linalg.norm(fitted[in_cut], axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.errors import Issue
+from gcode2krl.online.depth import depth_by_side, tool_axis
 from gcode2krl.online.judge import Judged
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.twin import CASES, Case, Twin, TwinRun, as_settings, simulate
@@ -104,6 +105,7 @@ def as_json(twin: Twin, runs: Runs, judged: Judged, source_line: Ints32) -> dict
         **figures,
         "reduction_percent": reduction,
         "gain": {case: _gain(runs, case, judged, source_line) for case in runs},
+        "depth": depth_by_side(twin, dict(runs), judged),
         "depth_mm": {case: _depth(twin, run, judged) for case, run in runs.items()},
         "descents_mm": {case: _worst(run, judged.ploughs) for case, run in runs.items()},
         "lines": [
@@ -173,8 +175,7 @@ def _depth(twin: Twin, run: TwinRun, judged: Judged) -> float | None:
     """Return the largest deviation along the tool axis in mm."""
     if not judged.counts.any():
         return None
-    x, y, z, w = twin.motion.rotation[judged.counts].T
-    axis = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
+    axis = tool_axis(twin)[judged.counts]
     return float(np.abs(np.einsum("ij,ij->i", run.error_mm[judged.counts], axis)).max())
 
 

@@ -19,21 +19,22 @@ def reaction(sent: Floats, time_s: Floats, dead_s: float, lag_s: float) -> Float
     return np.stack([lag(column, time_s, lag_s) for column in columns], axis=1)
 
 
-def with_backlash(q_program_rad: Floats, q_shift_rad: Floats, time_s: Floats, gap_rad: Floats) -> Floats:
-    """Return the joints (n, 6) behind the gears when the program and a correction of the axes move them.
+def with_backlash(
+    drives_rad: Floats, known_rad: Floats, time_s: Floats, gap_rad: Floats, closed: float = 0.0
+) -> Floats:
+    """Return the joints (n, 6) behind the gears when the drives are sent ``drives_rad`` (n, 6).
 
-    Each drive has a play of ``gap_rad`` (6,) with memory. The controller compensates it by the direction in
-    which the *program* moves an axis; it does not know a correction sent directly to the axes (the
-    assumption of Haehn & Weigold 2020, section 3.3). As long as both move the same way nothing is lost.
+    Each drive has a play of ``gap_rad`` (6,) with memory. The controller takes it out by the direction of
+    the motion that it knows, ``known_rad`` (n, 6). As long as the drives move the same way nothing is lost.
+    The load keeps the share ``closed`` of the play closed, which the controller does not know.
     """
-    total = q_program_rad + q_shift_rad
-    behind = np.empty_like(total)
+    behind = np.empty_like(drives_rad)
     for axis, gap in enumerate(gap_rad.tolist()):
         if gap == 0.0:
-            behind[:, axis] = total[:, axis]
+            behind[:, axis] = drives_rad[:, axis]
             continue
-        direction, _ = since_reversal(q_program_rad[:, axis], time_s)
-        behind[:, axis] = play(total[:, axis] + 0.5 * gap * direction, 0.5 * gap)
+        direction, _ = since_reversal(known_rad[:, axis], time_s)
+        behind[:, axis] = play(drives_rad[:, axis] + 0.5 * gap * direction, 0.5 * gap * (1.0 - closed))
     return behind
 
 

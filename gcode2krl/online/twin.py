@@ -39,7 +39,12 @@ CASES: tuple[Case, ...] = ("uncompensated", "cartesian", "pilot", "axis")
 SETTLED_MM = 1e-4
 MOST_ROUNDS = 12
 RIGID_NMM_RAD = 1e50
+PLAY_DEG = (0.005, 0.017)
+"""0.3 to 1 arcmin. A user of a worn KR 200 measured 0.3-0.4 mm at 2 m of reach, 0.7 arcmin; 1 arcmin is what
+makers of such gears allow, from memory of their catalogues. No measurement of a KR 300 was found."""
 CHECKSUM = 1
+_ROUNDED = 9
+"""Digits of a joint angle in rad: the rounding of the inverse kinematics is no reversal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +68,11 @@ class World:
     late_s: float = 0.0
     """How much later than predicted the cutter enters and leaves."""
     backlash_deg: float = 0.005
-    """Play of every drive: 0.3 arcmin, the small end of the reversal error of a large KUKA."""
+    """Play of every drive, within `PLAY_DEG`: its small end."""
+    closed: float = 0.0
+    """Share of the play, 0 to 1, that weight and cutting force keep closed. Not known; the controller, which
+    does not know it either, takes out the whole play: with 1 a Cartesian correction that turns an axis moves
+    the tip by more than was sent."""
     feed_scale: float = 1.0
     """The robot's speed over the predicted one."""
     override_percent: float = 100.0
@@ -243,14 +252,28 @@ def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: An
     )
 
 
+def axis_shift(twin: Twin, run: TwinRun) -> Floats:
+    """Return the motion (n, 6) in rad that an axis-specific case tells the drives beside the program."""
+    if run.device is None or run.device.correction.shape[1] != 6:
+        raise ValueError(f"{run.case} sends no corrections to the axes")
+    return reaction(run.device.correction, run.time_s, twin.world.dead_s, twin.world.lag_s)
+
+
 def _shift(twin: Twin, sent: Floats, time_s: Floats) -> Floats:
-    """Return the motion (n, 3) of the tip by the corrections sent."""
+    """Return the motion (n, 3) of the tip by the corrections sent.
+
+    The controller takes play out of the program and of a Cartesian correction, which it interpolates; of one
+    that goes to the axes it knows nothing (the assumption of Haehn & Weigold 2020, section 3.3).
+    """
     moved = reaction(sent, time_s, twin.world.dead_s, twin.world.lag_s)
-    if sent.shape[1] == 3:
+    q, closed = twin.joints.q_rad, twin.world.closed
+    cartesian = sent.shape[1] == 3
+    if cartesian and closed == 0.0:
         return moved
     gap = np.full(6, twin.world.backlash_deg * RAD_PER_DEG)
-    behind = with_backlash(twin.joints.q_rad, moved, time_s, gap)
-    return tip_shift_mm(behind, twin.joints.q_rad, twin.cell, twin.tool)
+    drives = np.round(joints_at(q, moved, twin.cell), _ROUNDED) if cartesian else q + moved
+    behind = with_backlash(drives, drives if cartesian else q, time_s, gap, closed)
+    return tip_shift_mm(behind, with_backlash(q, q, time_s, gap, closed), twin.cell, twin.tool)
 
 
 def _announced(twin: Twin, time_s: Floats) -> Announced:

@@ -1,6 +1,7 @@
 """What a program is written from and summed up by: a prediction without its tables of samples."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,6 +9,15 @@ from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Deflection, Forces, PilotForce, Targets, Toolpath
+
+
+class Bend(NamedTuple):
+    """The load on the arm where it bends most."""
+
+    q_rad: Floats
+    force_base_N: Floats
+    moment_base_Nmm: Floats
+    tool: int
 
 
 @dataclass(frozen=True)
@@ -27,6 +37,8 @@ class LoadFigures:
     across_mm: float | None
     """The deflection normal to the feed."""
     deflection_band: float
+    worst: Bend | None = field(default=None, compare=False)
+    """None where there is no deflection, or its joints were not taken."""
 
 
 class LargestLoads:
@@ -37,12 +49,18 @@ class LargestLoads:
         self._most = np.zeros(6)
         self._samples, self._cutting = 0, 0
         self._bands = (0.0, 0.0)
+        self._worst: Bend | None = None
 
-    def take(self, forces: Forces, deflection: Deflection | None) -> None:
-        """Add the next samples."""
+    def take(self, forces: Forces, deflection: Deflection | None, q_rad: Floats | None = None) -> None:
+        """Add the next samples, of which the joints are ``q_rad`` (m, 6)."""
         bent, across = 0.0, 0.0
         if deflection is not None:
             bent, across = largest(deflection.deflection_base_mm), largest(deflection.correction_base_mm)
+            if q_rad is not None and bent > self._most[4]:
+                size = np.einsum("ij,ij->i", deflection.deflection_base_mm, deflection.deflection_base_mm)
+                row = int(np.nanargmax(size))
+                load = forces.force_base_N[row].copy(), forces.moment_base_Nmm[row].copy()
+                self._worst = Bend(q_rad[row].copy(), *load, int(forces.tool[row]))
         most = [largest(forces.force_base_N)]
         most += [
             float(column.max(initial=0.0)) for column in (forces.torque_Nmm, forces.a_p_mm, forces.a_e_mm)
@@ -66,13 +84,14 @@ class LargestLoads:
             deflection_mm=bent if with_deflection else None,
             across_mm=across if with_deflection else None,
             deflection_band=self._bands[1],
+            worst=self._worst if with_deflection else None,
         )
 
 
-def load_figures(forces: Forces, deflection: Deflection | None) -> LoadFigures:
-    """Return the figures of whole tables."""
+def load_figures(forces: Forces, deflection: Deflection | None, q_rad: Floats | None = None) -> LoadFigures:
+    """Return the figures of whole tables; ``q_rad`` (m, 6) are the joints of their samples."""
     loads = LargestLoads()
-    loads.take(forces, deflection)
+    loads.take(forces, deflection, q_rad)
     return loads.figures(with_deflection=deflection is not None)
 
 

@@ -84,6 +84,15 @@ class Attempt:
             return input_of(self.order.part)
         return self.standard.as_input() if self.standard is not None else None
 
+    def quantities(self) -> dict[str, Any] | None:
+        """Return the figures with interval and source, see `quantities.quantities`; None before a motion."""
+        forecast = self.forecast
+        if forecast is None or not forecast.has_motion:
+            return None
+        from gcode2krl.translation.quantities import quantities
+
+        return quantities(forecast.loads, forecast.time_s, forecast.targets, forecast.cell)
+
     def _figures(self) -> dict[str, Any]:
         """Return the figures of the JSON contract; one whose stage did not run is null."""
         forecast, written = self.forecast, self.written
@@ -95,6 +104,7 @@ class Attempt:
             "path_mm": forecast.path_mm if forecast is not None else None,
             "max_force_N": loads.force_N if loads is not None else None,
             "max_deflection_mm": loads.deflection_mm if loads is not None else None,
+            "quantities": self.quantities(),
             "corner_error_mm": self.corner_mm,
             "verify": written.report.as_dict() if written is not None else {"max_deviation_mm": None},
             "pilot": pilot.as_dict() if pilot is not None else {"knots": None, "max_error_N": None},

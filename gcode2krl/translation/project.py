@@ -53,11 +53,15 @@ class Project:
         """The note that says which options come from the file."""
         if self.file is None:
             return ()
+        folder = self.file.parent
         words = ", ".join(
-            f"{key}={_word(value)}" for key, value in zip(self.keys, self.options.values(), strict=True)
+            f"{key}={_word(value, folder)}"
+            for key, value in zip(self.keys, self.options.values(), strict=True)
         )
         remedy = "nothing to do where they are meant; --isolated takes none"
-        return (Issue("note", "project-options", 0, f"{self.file} states {words}", remedy),)
+        return (
+            Issue("note", "project-options", 0, f"{_below(self.file, Path.cwd())} states {words}", remedy),
+        )
 
     @property
     def record(self) -> dict[str, Any]:
@@ -141,5 +145,15 @@ def _value(file: Path, key: str, value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _word(value: Any) -> str:
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+def _word(value: Any, folder: Path) -> str:
+    return ",".join(_below(each, folder) for each in (value if isinstance(value, tuple) else (value,)))
+
+
+def _below(value: Any, folder: Path) -> str:
+    """Return a value as text, the place of a file as seen from a folder above it."""
+    path = Path(str(value))
+    return (
+        path.relative_to(folder).as_posix()
+        if path.is_absolute() and path.is_relative_to(folder)
+        else str(value)
+    )

@@ -7,6 +7,7 @@ PART = (
     "X60\nG0 X0 Y30\nG0 Z30\nM5\nM30\n"
 )
 CELL = 'based_on = "demonstration"\n[stock]\nbox_mm = [[-20, -20, -10], [80, 50, 0]]\nresolution_mm = 0.5\n'
+CELL += "[material]\nrelative_band = 0.1\n"
 
 
 def test_a_rapid_through_stated_stock_refuses_a_compensated_program_too(run, tmp_path):

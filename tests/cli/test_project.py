@@ -123,3 +123,19 @@ def test_its_schema_knows_what_the_reader_knows():
     for wrong in ({"simplfy": 1}, {"files": [{}]}, {"dialect": "fanuk"}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(wrong, project_schema())
+
+
+def test_verify_takes_the_job_that_the_program_was_made_with(folder, run):
+    """The stock of the job is in the program's hashes: without it the cell would count as another one."""
+    (folder / "job.toml").write_text("[stock]\nbox_mm = [[-20, -20, -20], [80, 60, 0]]\n", encoding="utf-8")
+    state(folder, 'cell = "cell.toml"\njob = "job.toml"\n')
+    assert run("mill/a.nc", "-o", "A.src").code == 0
+    assert run("verify", "A.src", "mill/a.nc").code == 0
+    assert run("verify", "A.src", "mill/a.nc", "--isolated", "--cell", "cell.toml").code == 1
+
+
+def test_names_below_the_folder_are_told_as_seen_from_it(folder, run):
+    state(folder, 'cell = "cell.toml"\n')
+    told = run("mill/a.nc", "-o", "A.src").err
+    assert "gcode2krl.toml states cell=cell.toml [project-options]" in told
+    assert str(folder) not in told

@@ -99,6 +99,8 @@ def test_no_forces_is_refused(run, part):
 
 def test_offline_compensation_begins_with_the_material_that_is_left(run, part):
     part.write_text(SLOT.replace("Z-5", "Z-1"), encoding="ascii")
-    done = run(part, "--from-line", 9, "--compensate", "offline", "--json")
+    cell = part.with_name("measured.toml")
+    cell.write_text('based_on = "demonstration"\n[material]\nrelative_band = 0.1\n', encoding="utf-8")
+    done = run(part, "--cell", cell, "--from-line", 9, "--compensate", "offline", "--json")
     assert done.code == 0, done.err
     assert "slot_from9.src" in json.loads(done.out)["files"][0]

@@ -15,6 +15,7 @@ PART = (
     f"{WAVE}G0 Z30\nM5\nM30\n"
 )
 CELL = 'based_on = "demonstration"\n[stock]\nbox_mm = [[-20, -20, -10], [100, 30, 0]]\nresolution_mm = 0.5\n'
+CELL += "[material]\nrelative_band = 0.1\n"
 
 
 @pytest.fixture

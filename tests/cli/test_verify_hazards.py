@@ -149,7 +149,7 @@ def test_an_example_with_its_own_cell_agrees(run, tmp_path, name):
 def test_a_compensated_program_agrees(run, tmp_path):
     nc, cell = tmp_path / "part.nc", tmp_path / "cell.toml"
     nc.write_text(SLOT.replace("G0 X60\n", "").replace("Z-2", "Z-0.5"))
-    cell.write_text(CELL)
+    cell.write_text(CELL + "[material]\nrelative_band = 0.1\n")
     options = ("--cell", cell, "--compensate", "offline")
     made = run(nc, "-o", tmp_path / "made.src", *options)
     assert made.code == 0, made.err

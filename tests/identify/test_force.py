@@ -1,16 +1,20 @@
 """Coefficients are recovered from forces made with them; coefficients that are not determined are refused."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
 
+from benchmarks.measured_slots import MEASURED_N, fit_of, held_out
 from gcode2krl.errors import RefusedError
-from gcode2krl.identify.force import NAMES, fit_force
+from gcode2krl.identify.force import NAMES, UNTESTED_BAND, fit_force
 
 TRUE = np.array([850.0, 200.0, 180.0, 20.0, 24.0, 3.0])
 ZERO = np.array([5.0, -8.0, 3.0])
 N = 3
+AUTHOR = np.array([958.86, 250.863, 146.361, 15.758, 19.434, 18.2075])
+"""What the author of the measured slots fitted to them."""
 
 
 def slot_basis(f_z_mm, a_p_mm):
@@ -40,6 +44,7 @@ def test_slots_at_three_feeds_give_all_six():
     np.testing.assert_allclose(fit.value, TRUE, rtol=0.02, atol=0.3)
     np.testing.assert_allclose(fit.zero_N, ZERO, atol=1.5)
     assert fit.relative_band < 0.05
+    assert np.nanmax(fit.misfit) < fit.relative_band
 
 
 @pytest.mark.slow
@@ -65,6 +70,36 @@ def test_one_feed_cannot_tell_cutting_from_edge():
     with pytest.raises(RefusedError) as refused:
         fit.require_all("run")
     assert any(name in str(refused.value.issues[0].message) for name in NAMES)
+
+
+def test_one_confounding_leaves_the_other_coefficients_alone():
+    """At one depth without air the edges' force is a constant, as the sensor's zero is."""
+    fit = fit_of(MEASURED_N, zeroed=False)
+    np.testing.assert_array_equal(fit.determined, [True, True, True, False, False, False])
+    np.testing.assert_allclose(fit.value[:3], AUTHOR[:3], rtol=0.014)
+    with pytest.raises(RefusedError, match="Kte, Kre, Kae") as refused:
+        fit.require_all("run")
+    assert "--zeroed" in refused.value.issues[0].remedy
+
+
+@pytest.mark.parametrize("told", [{"zeroed": True}, {"zeroed": False, "in_air": 40}])
+def test_a_known_zero_gives_what_the_author_found(told):
+    fit = fit_of(MEASURED_N, **told)
+    assert fit.determined.all()
+    np.testing.assert_allclose(fit.value, AUTHOR, rtol=0.014)
+
+
+def test_held_out_slots_are_inside_the_band_of_the_others():
+    inside = {f_z: error <= band for f_z, error, band, within in held_out() if within}
+    assert len(inside) == 3
+    assert all(inside.values())
+
+
+def test_the_band_is_that_of_cuts_left_out_and_not_of_noise():
+    """The law bends below 0.05 mm, which noise-free means cannot show."""
+    thicker = fit_of([f_z for f_z in MEASURED_N if f_z > 0.03])
+    assert fit_of(MEASURED_N).relative_band > 1.4 * thicker.relative_band
+    assert fit_of([0.075, 0.1]).relative_band >= UNTESTED_BAND
 
 
 def test_a_run_in_air_is_refused():
@@ -120,6 +155,14 @@ def test_the_command_reads_a_run_and_writes_the_cell(run, tmp_path):
     for name, true in zip(NAMES, TRUE, strict=True):
         assert found[name]["value"] == pytest.approx(true, rel=0.03, abs=0.5)
     assert (tmp_path / "fit.png").stat().st_size > 10_000
+    written = tomllib.loads((tmp_path / "found.toml").read_text(encoding="utf-8"))
+    low, high = written["material"]["measured_f_z_mm"]
+    assert low == pytest.approx(1200 / 13000 / 3, rel=0.02)
+    assert high == pytest.approx(4400 / 13000 / 3, rel=0.02)
     again = run("predict", "slots.nc", "-o", "again", "--cell", "found.toml", "-q")
     assert again.code == 0, again.err
+    assert "force-unmeasured" not in again.err
+    (tmp_path / "fast.nc").write_text(SLOTS.replace("F4400", "F9000"), encoding="ascii")
+    fast = run("predict", "fast.nc", "-o", "fast", "--cell", "found.toml", "-q")
+    assert "force-unmeasured" in fast.err
     assert run("identify", "force", "prediction").code == 2

@@ -28,7 +28,8 @@ OTHER = {
     + "".join(f"G1 X{k / 10} F1500\n" for k in range(600))
     + "G0 Z50\nM5\nM30\n",
 }
-CELL = 'based_on = "demonstration"\n[program]\nmax_lines = 250\n[online]\nmost_mm = 1.5\n[online.link]\n'
+CELL = 'based_on = "demonstration"\n[material]\nrelative_band = 0.1\n'
+CELL += "[program]\nmax_lines = 250\n[online]\nmost_mm = 1.5\n[online.link]\n"
 CELL += 'address = "192.168.7.3"\nport = 50001\n'
 WAYS = {
     "whole": ["--max-lines", "100000"],

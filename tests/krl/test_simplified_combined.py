@@ -14,6 +14,7 @@ from gcode2krl.translation.compensation import compensated
 CELL = resolve_cell(
     {
         "based_on": "demonstration",
+        "material": {"relative_band": 0.1},
         "stock": {"box_mm": [[-20, -20, -10], [100, 30, 0]], "resolution_mm": 0.5},
     }
 )

@@ -42,7 +42,7 @@ def test_backlash_is_taken_up_while_the_correction_goes_with_the_program():
     shift = np.zeros((500, 6))
     shift[:, 1] = 0.001 * np.sin(3.0 * TIME_S)  # slower than the program at any time
     gap = np.full(6, 0.01 * RAD_PER_DEG)
-    behind = with_backlash(program, shift, TIME_S, gap)
+    behind = with_backlash(program + shift, program, TIME_S, gap)
     np.testing.assert_allclose(behind[20:, 1], (program + shift)[20:, 1], atol=1e-12)
 
 
@@ -52,7 +52,7 @@ def test_it_is_lost_where_the_correction_turns_the_axis_back():
     shift = np.zeros((500, 6))
     shift[250:, 1] = -0.004
     gap = np.full(6, 0.01 * RAD_PER_DEG)
-    behind = with_backlash(program, shift, TIME_S, gap)
+    behind = with_backlash(program + shift, program, TIME_S, gap)
     np.testing.assert_allclose(behind[250, 1] - (program + shift)[250, 1], gap[1], rtol=1e-6)
     brute = brute_backlash(program[:, 1], shift[:, 1], gap[1])
     np.testing.assert_allclose(behind[60:, 1], brute[60:], atol=1e-9)

@@ -167,6 +167,11 @@ _SOFT_N_MM2 = 150.0
 """Softer is not metal: hardwood has 53 N/mm², the softest metal of the library 244."""
 
 
+WIDEST_BAND = 3.0
+"""Wider is no statement about a force."""
+_Range = tuple[Positive, Positive]
+
+
 class Material(Provenance):
     """What is cut, and its force law: one of `linear_edge` and `kienzle`."""
 
@@ -174,14 +179,24 @@ class Material(Provenance):
     name: str = ""
     linear_edge: LinearEdge | None = None
     kienzle: Kienzle | None = None
-    relative_band: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.4
-    """Half-width of the 90 % band of forces, relative."""
+    relative_band: Annotated[float, Field(strict=True, ge=0, le=WIDEST_BAND)] = 0.4
+    """Half-width of the 90 % band of forces, relative; above 1 the force may be anything from 0 on."""
+    measured_f_z_mm: _Range | None = None
+    """Feeds per tooth between which the coefficients were measured, and their band holds."""
+    measured_a_p_mm: _Range | None = None
+    """Depths of cut between which the coefficients were measured."""
     note: str = ""
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
         if self.linear_edge is not None and self.kienzle is not None:
             raise ValueError("give linear_edge or kienzle, not both")
+        for key, pair in (
+            ("measured_f_z_mm", self.measured_f_z_mm),
+            ("measured_a_p_mm", self.measured_a_p_mm),
+        ):
+            if pair is not None and pair[0] > pair[1]:
+                raise ValueError(f"{key}: from {pair[0]:g} is above {pair[1]:g}")
         return self
 
     @property
