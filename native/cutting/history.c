@@ -66,7 +66,7 @@ EXPORT int64_t cutting_history(const Grid *grid, const Path *path, Ints32 slot, 
         const double y_low = lesser(a[1], b[1]) - radius, y_high = greater(a[1], b[1]) + radius;
         if (highest(grid, x_low, x_high, y_low, y_high) <= lesser(a[2], b[2]))
             continue;
-        remove_sweep(grid, path, k);
+        remove_sweep(grid, path, k, 0.0);
         draw_walls(grid, path, k);
         const Cells rows = cells_between(y_low, y_high, grid->y_mm, grid->dy_mm, 0, mean.rows * side);
         const Cells columns = cells_between(x_low, x_high, grid->x_mm, grid->dx_mm, 0, mean.columns * side);
