@@ -93,7 +93,7 @@ class NoiseResult:
 
     @property
     def is_a_guess(self) -> bool:
-        """Tell whether what no effect explains was taken for the noise of poses, since nothing else tells it."""
+        """Tell whether the noise of poses is only what no effect explains: nothing else tells it."""
         return self.stated is None and self.source == OF_POSES
 
 
