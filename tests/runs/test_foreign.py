@@ -198,6 +198,10 @@ def test_what_a_run_before_said_is_doubted_by_the_values():
         ("torque_joint_1", ""),
         ("target_actual_1", ""),
         ("joint_10", ""),
+        ("Axis1_State", ""),
+        ("State_Axis1", ""),
+        ("output_1", ""),
+        ("load_1", ""),
     ],
 )
 def test_a_joint_is_known_by_the_usual_words_in_any_order(name, column):
