@@ -256,6 +256,7 @@ def test_the_sheet_of_an_excel_file_that_is_a_table_is_read(tmp_path):
     file = tmp_path / "log.xlsx"
     file.write_bytes(sheet([(n, (t, *q)) for n, (t, q) in enumerate(zip(TIME_S, Q, strict=True), 2)]))
     run = run_from(file)
+    assert guess_of(file).table.how == "Excel, sheet 2 of 2"
     np.testing.assert_allclose(np.degrees(run.controller.q_act_rad), Q, atol=1e-9)
     np.testing.assert_allclose(run.controller.time_s, TIME_S - TIME_S[0], atol=1e-9)
 
