@@ -11,6 +11,7 @@ from gcode2krl.gap.tell.result import (
     EventResult,
     JointResult,
     MomentResult,
+    NoiseResult,
     PhaseResult,
     RunSize,
     Where,
@@ -60,6 +61,18 @@ def test_no_gap_is_said_in_mm_where_the_tip_was_measured():
     joints = replace(none, links=(), gap=replace(GAP.gap, unit="deg", rms_before=0.0011))
     assert headline(joints) == "No gap: 0.0011 deg RMS are what noise and normal mismatch explain."
     assert "Nothing was compared" in headline(replace(none, links=(), gap=replace(GAP.gap, rms_before=None)))
+
+
+def test_poses_whose_noise_nobody_knows_are_not_called_sound():
+    noise = NoiseResult(stated=None, learnt=0.3, short=0.3, source="what no effect explains")
+    links = tuple(replace(link, noise=noise) for link in GAP.links)
+    none = replace(GAP, verdict="no_gap", causes=(), at_part=None, links=links)
+    assert headline(none) == (
+        "No gap is named, but the noise is unknown: the tip is off by 0.41 mm RMS, noise or a gap that no "
+        "effect explains."
+    )
+    stated = tuple(replace(link, noise=replace(noise, stated=0.3)) for link in GAP.links)
+    assert headline(replace(none, links=stated)).endswith("which noise and normal mismatch explain.")
 
 
 def test_a_slip_is_said_first_whatever_else_there_is():

@@ -198,6 +198,10 @@ def test_what_a_run_before_said_is_doubted_by_the_values():
         ("torque_joint_1", ""),
         ("target_actual_1", ""),
         ("joint_10", ""),
+        ("Axis1_State", ""),
+        ("State_Axis1", ""),
+        ("output_1", ""),
+        ("load_1", ""),
     ],
 )
 def test_a_joint_is_known_by_the_usual_words_in_any_order(name, column):
@@ -252,6 +256,7 @@ def test_the_sheet_of_an_excel_file_that_is_a_table_is_read(tmp_path):
     file = tmp_path / "log.xlsx"
     file.write_bytes(sheet([(n, (t, *q)) for n, (t, q) in enumerate(zip(TIME_S, Q, strict=True), 2)]))
     run = run_from(file)
+    assert guess_of(file).table.how == "Excel, sheet 2 of 2"
     np.testing.assert_allclose(np.degrees(run.controller.q_act_rad), Q, atol=1e-9)
     np.testing.assert_allclose(run.controller.time_s, TIME_S - TIME_S[0], atol=1e-9)
 

@@ -94,6 +94,10 @@ def _no_gap(gap: Gap) -> str:
     tip = next((link for link in gap.links if link.link == "mechanics"), None)
     if tip is not None:
         what = f"the tip is off by {amount(tip.rms_before, tip.unit)} RMS"
+        if tip.noise is not None and tip.noise.is_a_guess:
+            return (
+                f"No gap is named, but the noise is unknown: {what}, noise or a gap that no effect explains."
+            )
         return f"No gap: {what}, which noise and normal mismatch explain."
     size = gap.gap
     if size.rms_before is None:

@@ -10,12 +10,12 @@ from gcode2krl.gap.beside.trace import Trace, Whose
 from gcode2krl.gap.choose.judged import Judgement
 from gcode2krl.gap.fit.noise_source import are_repeats
 from gcode2krl.gap.fit.pose_noise import is_revisited
-from gcode2krl.gap.tell.result import NoiseResult
+from gcode2krl.gap.tell.result import OF_POSES, NoiseResult
 from gcode2krl.gap.tell.words import listed, number
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
-_REPEATS, _RUNS, _POSES = "repeats", "each run by itself", "what no effect explains"
+_REPEATS, _RUNS = "repeats", "each run by itself"
 
 
 def noise_of(judgement: Judgement) -> NoiseResult | None:
@@ -34,7 +34,7 @@ def noise_of(judgement: Judgement) -> NoiseResult | None:
 
 def _source(traces: Sequence[Trace]) -> str:
     if traces[0].still:
-        return _REPEATS if is_revisited(traces) else _POSES
+        return _REPEATS if is_revisited(traces) else OF_POSES
     return _REPEATS if are_repeats(traces) else _RUNS
 
 

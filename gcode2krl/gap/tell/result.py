@@ -74,6 +74,10 @@ class AtPart:
     """Of every run; empty where a run has no size of its own, as for clocks, scans and slips."""
 
 
+OF_POSES = "what no effect explains"
+"""Where the noise of poses is from that are not visited again."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class NoiseResult:
     """The noise of a link's instrument: rms over its components of their standard deviations."""
@@ -86,6 +90,11 @@ class NoiseResult:
     """What of it is forgotten within milliseconds: the other reading, where nothing else is known."""
     source: str
     """In the JSON object ``from``: repeats, each run by itself, or (of poses) what no effect explains."""
+
+    @property
+    def is_a_guess(self) -> bool:
+        """Tell whether the noise of poses is only what no effect explains: nothing else tells it."""
+        return self.stated is None and self.source == OF_POSES
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,7 +43,9 @@ def number(value: float | None) -> str:
 
 def rounded(value: float) -> str:
     """Return a number with two significant digits, written out."""
-    if value == 0.0 or not math.isfinite(value):
+    if abs(value) < 1e-9:  # what is left of two equal numbers
+        return "0"
+    if not math.isfinite(value):
         return f"{value:g}"
     decimals = max(0, 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{decimals}f}"

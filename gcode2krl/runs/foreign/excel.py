@@ -21,9 +21,8 @@ def lines_of_sheets(path: Path) -> list[list[str]]:
     """
     try:
         with zipfile.ZipFile(path) as book:
-            sheets = sorted(
-                name for name in book.namelist() if re.fullmatch(r"xl/worksheets/[^/]+\.xml", name)
-            )
+            parts = [re.fullmatch(r"xl/worksheets/sheet(\d+)\.xml", name) for name in book.namelist()]
+            sheets = [part[0] for part in sorted(filter(None, parts), key=lambda part: int(part[1]))]
             if any(book.getinfo(name).file_size > _MOST_BYTES for name in sheets):
                 words = "a sheet of more than 2 GB"
                 raise input_error("trace-unreadable", words, "cut it to the run", source=str(path))

@@ -31,7 +31,7 @@ _TRAILING = ("deg", "degrees", "rad", "mm", "m", "um", "n", "kn", "nm", "nmm", "
 """Units that a name may end in, after an underscore."""
 _BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]{1,12}?)\s*[\])>}]\s*$")
 _OTHER_QUANTITIES = re.compile(
-    r"vel|speed|acc|jerk|torque|current|temp|force|effort|power|err|lag|status|mode|volt|moment|strom|geschw"
+    r"vel|speed|acc|jerk|torque|current|temp|force|effort|power|err|lag|stat|mode|volt|moment|strom|geschw"
     r"|schlepp|dev|diff|delta|noise|limit|(?:^|_)(?:d|dd|v|qd|qdd|std)(?:_|$)"
 )
 """Words of quantities that a pattern must have itself: the current of an axis is none of its angles."""
@@ -168,10 +168,10 @@ def _joint(name: str, unit: str) -> Meaning:
     first = next((k for k in reversed(range(number)) if parts[k] not in kind), -1) + 1
     used = {kind.get(part, "") for part in (*parts[first:number], *parts[number + 1 :])}
     sides = used & {"cmd", "act", "load"}
-    named = "joint" in used or (sides and first == 0)
+    named = "joint" in used or (sides and sides != {"load"} and first == 0)
     if number < 0 or len(parts[number]) > 1 or "" in used or len(sides) > 1 or not named:
         return Meaning("", unit)
-    if _OTHER_QUANTITIES.search("_".join(parts[:first])):
+    if _OTHER_QUANTITIES.search("_".join(parts[:first]).replace("joint_states", "")):
         return Meaning("", unit)
     fixed = unit if unit in FACTORS["angle"] else ""
     why = "usual names; the name states the unit" if fixed else "usual names"

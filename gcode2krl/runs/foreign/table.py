@@ -276,9 +276,10 @@ def _seconds(stamps: "pl.Series") -> Floats:
 def _of_excel(file: Path) -> Table:
     """Return the first sheet that is a table; the last one's error where none is."""
     refused: NotUnderstoodError | None = None
-    for lines in lines_of_sheets(file):
+    sheets = lines_of_sheets(file)
+    for number, lines in enumerate(sheets, 1):
         try:
-            return replace(_of_text("\n".join(lines), file), how="Excel")
+            return replace(_of_text("\n".join(lines), file), how=f"Excel, sheet {number} of {len(sheets)}")
         except NotUnderstoodError as error:
             refused = error
     raise refused or input_error("trace-empty", "no sheet", "export the recording again", source=str(file))
