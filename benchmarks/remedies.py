@@ -9,7 +9,9 @@ So it goes on, ten times at most. A program that is read at the end is compared 
 and each that did not help; the exit code is 1 where one did not.
 """
 
+import functools
 import io
+import json
 import re
 import sys
 from collections import Counter
@@ -26,7 +28,7 @@ from tests.reference import controls
 
 MOST, MOST_BYTES, NO_PROGRAMS = 10, 400_000, (".toml", ".py", ".json", ".md", ".tbl")
 _TOOL = {"diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0}
-_ZERO = dict.fromkeys(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 0.0)
+_CUTTER = {"program": {"cutter": {"lead_in": "a", "d": "radius"}}}
 _LINES = (
     ("write G700", r"G7([01])\b", r"G7\g<1>0"),
     ("remove (?:the|this) (?:line|block)|remove it", r"^.*$", ""),
@@ -37,13 +39,24 @@ _LINES = (
 """What is said, and what is then written in the line that is named."""
 
 
+@functools.cache
+def cell_of(stated):
+    """Return a cell with the tools T1 to T99, and what is stated beside them, as JSON."""
+    sections = json.loads(stated)
+    tools = {n: dict(_TOOL) for n in range(1, 100)}
+    for number, name in zip(range(99, 0, -1), sections.pop("names", []), strict=False):
+        tools[number]["name"] = name
+    return over_demonstration({"tool": tools, **sections})
+
+
 class Attempt:
     """A program as it stands, with the dialect and the cell in which it is read."""
 
     def __init__(self, path, dialect):
         self.path, self.dialect = path, dialect
         self.lines = path.read_bytes().decode("utf-8", "replace").replace("\r", "").split("\n")
-        self.cell = {"tool": {n: dict(_TOOL) for n in range(1, 100)}}
+        self.stated = {}
+        """Sections of the cell beside its tools, and names of tools, as remedies ask for them."""
 
     def text(self):
         """Return the text as it stands."""
@@ -52,8 +65,7 @@ class Attempt:
     def read(self, dialect=None):
         """Return the reading, or raise."""
         stream = io.BytesIO(self.text().encode())
-        cell = over_demonstration(self.cell)
-        folders = (self.path.parent,)
+        cell, folders = cell_of(json.dumps(self.stated)), (self.path.parent,)
         return read_stream(stream, str(self.path), cell, dialect=dialect or self.dialect, folders=folders)
 
     def refusals(self):
@@ -75,16 +87,16 @@ class Attempt:
         said = issue.remedy
         if (dialect := re.match(r"--dialect ([a-z-]+)", said)) is not None:
             self.dialect = dialect[1]
+            self.stated |= _CUTTER if "[program.cutter]" in said else {}
             return "another dialect"
         if issue.code == "decimal-point":
             self.dialect = "fanuc-calculator"
             return "another dialect"
-        if "[program.cutter]" in said and "cutter" not in self.cell.get("program", {}):
-            self.cell["program"] = {"cutter": {"lead_in": "a", "d": "radius"}}
+        if "[program.cutter]" in said:
+            self.stated |= _CUTTER
             return "a key of the cell"
         if 'name = "' in said and (name := re.search(r'"([^"]+)"', self.lines[issue.line - 1])) is not None:
-            free = next(n for n in range(99, 0, -1) if "name" not in self.cell["tool"][n])
-            self.cell["tool"][free]["name"] = name[1]
+            self.stated["names"] = [*self.stated.get("names", []), name[1]]
             return "a key of the cell"
         for pattern, old, new in _LINES:
             if re.search(pattern, said) and 0 < issue.line <= len(self.lines):
@@ -111,14 +123,15 @@ def promised(issue, after):
 def carried_out(path, dialect, counts):
     """Follow what is said of one program; yield what did not help."""
     attempt = Attempt(path, dialect)
+    refused = attempt.refusals()
     for step in range(MOST):
-        refused = attempt.refusals()
         followed, kind = next(((i, k) for i in refused if (k := attempt.follow(i))), (None, ""))
         if followed is None:
             counts["taken by a person" if refused else "read after others" if step else "read at once"] += 1
             break
         counts["tried", kind] += 1
-        wrong = promised(followed, attempt.refusals())
+        refused = attempt.refusals()
+        wrong = promised(followed, refused)
         if wrong:
             yield f"{path.name}:{followed.line}: {wrong}: {followed.message} -> {followed.remedy}"
             break
@@ -144,12 +157,13 @@ def main():
             mark = control_of(head)
             for dialect in dict.fromkeys(("linuxcnc", mark.control.dialects[0] if mark else "linuxcnc")):
                 counts["programs"] += dialect == "linuxcnc"
-                wrong += carried_out(path, dialect, counts)
+                for what in carried_out(path, dialect, counts):
+                    print(what, flush=True)
+                    wrong.append(what)
     for key, count in sorted(counts.items(), key=str):
         print(*(key if isinstance(key, tuple) else (key,)), count)
     tried = sum(count for key, count in counts.items() if isinstance(key, tuple))
     print(f"advices tried {tried}, not as promised {len(wrong)}")
-    print("\n".join(wrong))
     return int(bool(wrong))
 
 

@@ -357,7 +357,11 @@ class Translator:
             return "SUPA G0 Z0"
         words = self._words(tokens)
         if not moves:
-            return " ".join([*words, *self._feed_words(tokens), *self._m_words(tokens)])
+            ends = {t["m"] for t in tokens} & {"89", "99"}
+            if "89" in ends:
+                raise _RefusedError(r.REASON_HOLE)
+            hole = [self._hole_here()] if ends else []
+            return " ".join([*words, *self._feed_words(tokens), *self._m_words(tokens), *hole])
         if machine:
             self._forget_place()
             return self._moved("SUPA G0" if fast else "SUPA G1", tokens, words)

@@ -133,6 +133,8 @@ def test_cycle_1_begins_where_the_tool_stands():
     """Strokes of 5 mm from 2 mm below; back in to 0.6 mm above the last depth."""
     found = read(numbered(f"{PECKING}\nL Z+12 FMAX\nL X+3 FMAX M99"))
     z = found.position_mm[:, 2].tolist()
+    without_a_move = read(numbered(f"{PECKING}\nL X+3 Z+12 FMAX\nL FMAX M99")).position_mm[:, 2]
+    np.testing.assert_allclose(without_a_move[-5:], z[-5:])
     np.testing.assert_allclose(z[-6:], [12, 5, 12, 5.6, 1, 12], atol=1e-9)
     assert found.dwell_s[-2] == 0.5
 
@@ -152,7 +154,9 @@ def test_cycle_1_begins_where_the_tool_stands():
         ("CALL LBL 1\nL M2\nLBL 1\nL X+1", 1),
         ("L X+1 F100\nRND R5 F50\nL Y+9", 2),
         ("CYCL DEF 1.0 PECKING\nCYCL CALL", 2),
-        (f"{PECKING}\nL X+1 FMAX M99", 7),
+        (f"{PECKING}\nL FMAX M89", 7),
+        ("L FMAX M99", 1),
+        (f"{PECKING}\nTOOL CALL 1 Z S900\nCYCL CALL", 8),
         (f"{PECKING}\nL Z+9 FMAX\nCYCL DEF 7.0 DATUM\nCYCL DEF 7.1 Z+5\nCYCL CALL", 10),
         ("CC X+1 Y+1\nL X+3 Y+1 FMAX\nCYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+5\nCP PA+90 DR+", 5),
         ("CC X+1 Y+1\nL X+3 Y+1 FMAX\nLBL 1\nCP PA+90 DR+\nL X+9 FMAX\nCALL LBL 1 REP 1", 4),
