@@ -34,7 +34,6 @@ _LINES = (
     ("remove (?:the|this) (?:line|block)|remove it", r"^.*$", ""),
     ("program F before the first", r"[ \t\r]*(?:;.*)?$", " F100"),
     ("without the inner \\( and \\)", r"\((.*)\)", lambda m: f"({re.sub('[()]', ' ', m[1])})"),
-    ("write Z|write X|write Y|write [A-Z]-?\\d+\\. in the post", r"([XYZIJKRF]-?\d+)(?![\d.])", r"\1."),
 )
 """What is said, and what is then written in the line that is named."""
 
