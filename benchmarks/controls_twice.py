@@ -52,13 +52,13 @@ def reading(path, dialect, search):
 
 def places(toolpath):
     """Return the programmed places of a reading: of an arc the end alone, of what is not known None."""
-    arc, at = toolpath.arc, toolpath.position_mm
+    arc, at, known = toolpath.arc, toolpath.position_mm, toolpath.known
     rows = [
         k
         for k in range(1, len(arc))
         if not toolpath.machine[k]
         and (arc[k] < 0 or k + 1 == len(arc) or arc[k + 1] != arc[k])
-        and (arc[k] >= 0 or (at[k] != at[k - 1]).any() or toolpath.known[k].all())
+        and (arc[k] >= 0 or (at[k] != at[k - 1]).any() or (known[k] != known[k - 1]).any() or known[k].all())
     ]
     return [
         tuple(float(p) if is_known else None for p, is_known in zip(at[k], toolpath.known[k], strict=True))

@@ -102,7 +102,7 @@ REASONS: Final = (
     ),
     (
         "a corner is rounded or chamfered where a G1 in the plane follows another in the very next block,"
-        " both longer than the corner and with one feed",
+        " both longer than the corner and with one feed, without G41 and G42",
         "let the post write the corner as G1, G2 and G3",
     ),
     (
@@ -142,8 +142,8 @@ REASONS: Final = (
         "write both coordinates in it",
     ),
     (
-        "of CYCLE83 are read one first depth, FDEP or FDPR, not below the last, DAM as a length, FRF up to 1,"
-        " VARI 0 or 1, and the tool's axis of G17",
+        "of CYCLE83 are read one first depth, FDEP or FDPR, FRF above 0 and up to 1, VARI 0 or 1, and the"
+        " tool's axis of G17",
         "write CYCLE83(RTP,RFP,SDIS,DP,,,FDPR,0,0,0,1,1), or let the post write the cycle out in G0 and G1",
     ),
     (
@@ -219,9 +219,8 @@ REASONS: Final = (
     ("a word that is not read in this block", "check the word, or let the post write another"),
     ("this M-code changes how the control moves", "let the post leave it out, or write what it stands for"),
     (
-        "of drilling cycles are read 200, 201, 203 without Q212 and Q213 and out at FMAX or in one stroke, "
-        "207 behind"
-        " a TOOL CALL with S, with Q200 to Q206 stated, defined before the call",
+        "of drilling cycles are read 1 at a stated Z, 200, 201, 203 without Q212 and Q213 and out at FMAX or "
+        "in one stroke, 207 behind a TOOL CALL with S, with Q200 to Q206 stated, defined before the call",
         "let the post write L, or cycle 200 with its Q words",
     ),
     ("of CYCLE85 are read both feeds, FFR in and RFF out, under G94", "write both feeds"),

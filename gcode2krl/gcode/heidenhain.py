@@ -94,9 +94,12 @@ class Translator:
         self._out = [""] * len(self._lines)
         self._motion = -1
         """Line of the last motion, to which RND and CHF belong; -1 = none."""
-        self._at: dict[str, float | None] = {"X": None, "Y": None}
+        self._at: dict[str, float | None] = {"X": None, "Y": None, "Z": None}
+        """Where the last block has led, in its coordinates; None where that is not sure."""
         self._pole: dict[str, str] = {}
         self._hole, self._modal = "", False
+        self._pecking: dict[str, str] = {}
+        """Values of cycle 1 by their numbers: its hole begins where the tool stands."""
         self._feed, self._speed = "", ""
         self._shift = {"X": "0", "Y": "0", "Z": "0"}
         self._labels: dict[str, str] = {}
@@ -170,6 +173,7 @@ class Translator:
             raise _RefusedError(r.REASON_TOOL_CALL)
         words = []
         if found[1] is not None:
+            self._forget_place()
             words.append(f"T={found[1]} M6" if found[1].startswith('"') else f"T{found[1]} M6")
         if found[3] is not None:
             self._speed = _expression(found[3])
@@ -190,6 +194,7 @@ class Translator:
             if (incremental or self._computes) and _float(value) != 0.0:
                 raise _RefusedError(r.REASON_SHIFT)
             self._shift[axis] = self._shift[axis] if incremental else _expression(value)
+        self._forget_place()
         return "TRANS " + " ".join(f"{axis}={value}" for axis, value in self._shift.items())
 
     def _datum_preset(self, code: str) -> str:
@@ -198,7 +203,11 @@ class Translator:
         if number is None or any(value != "0" for value in self._shift.values()):  # a preset ends a shift
             raise _RefusedError(r.REASON_SHIFT)
         n = int(number[1])
+        self._forget_place()
         return f"G{53 + n}" if n <= _FIRST_OFFSETS else f"G{500 + n}"
+
+    def _forget_place(self) -> None:
+        self._at = dict.fromkeys(self._at)
 
     def _tilt(self, code: str) -> str:
         if any(_float(value) != 0.0 for value in re.findall(rf"[ABC]({_VALUE})", code.partition("19.")[2])):
@@ -248,6 +257,7 @@ class Translator:
         found = _LABEL.match(code)
         if found is None:
             raise _RefusedError(r.REASON_FLOW)
+        self._forget_place()  # other lines lead here too
         if found[1] == "0":
             self._ends += 1
             return f"LEND_{self._ends}:"
@@ -258,6 +268,7 @@ class Translator:
         begin = self._labels_at.get(found[1], []) if found is not None else []
         if found is None or len(begin) != 1 or (found[2] is not None and begin[0] > self._k):
             raise _RefusedError(r.REASON_TNC_LABEL)
+        self._forget_place()
         if found[2] is not None:
             return f"REPEAT {self._label_of(found[1])} P={int(found[2])}"
         end = self._end_of(found[1])
@@ -342,13 +353,17 @@ class Translator:
         if any(t["m"] == "140" for t in tokens):
             if moves or not any(t["limit"] for t in tokens):
                 raise _RefusedError(r.REASON_TNC_M)
-            self._at = dict.fromkeys(self._at)
+            self._forget_place()
             return "SUPA G0 Z0"
         words = self._words(tokens)
         if not moves:
-            return " ".join([*words, *self._feed_words(tokens), *self._m_words(tokens)])
+            ends = {t["m"] for t in tokens} & {"89", "99"}
+            if "89" in ends:
+                raise _RefusedError(r.REASON_HOLE)
+            hole = [self._hole_here()] if ends else []
+            return " ".join([*words, *self._feed_words(tokens), *self._m_words(tokens), *hole])
         if machine:
-            self._at = dict.fromkeys(self._at)
+            self._forget_place()
             return self._moved("SUPA G0" if fast else "SUPA G1", tokens, words)
         return self._moved("G0" if fast else "G1", tokens, words)
 
@@ -394,7 +409,7 @@ class Translator:
         tokens = _tokens(code[1:])
         way = next((t["way"] for t in tokens if t["way"]), "")
         axes = {t["axis"] for t in tokens if t["axis"]}
-        if not way or not axes <= {"X", "Y"} or not axes:
+        if not way or not axes <= {"X", "Y"}:  # without both it is a full circle
             raise _RefusedError(r.REASON_TNC_ARC)
         centre = [f"{letter}=AC({self._pole_word(axis)})" for letter, axis in (("I", "X"), ("J", "Y"))]
         return self._moved("G3" if way == "+" else "G2", tokens, [*self._words(tokens), *centre])
@@ -440,8 +455,9 @@ class Translator:
             raise _RefusedError(r.REASON_TNC_POLE)
         radius, from_deg = math.hypot(at_x - x, at_y - y), math.degrees(math.atan2(at_y - y, at_x - x))
         to_rad = math.radians(angle + (from_deg if incremental else 0.0))
-        self._at = {"X": x + radius * math.cos(to_rad), "Y": y + radius * math.sin(to_rad)}
-        return [f"{axis}={value:.9f}" for axis, value in self._at.items()]
+        end = {"X": x + radius * math.cos(to_rad), "Y": y + radius * math.sin(to_rad)}
+        self._at.update(end)
+        return [f"{axis}={value:.9f}" for axis, value in end.items()]
 
     def _corner(self, code: str) -> str:
         found = re.match(rf"(RND|CHF) *R?({_VALUE})(?: *F({_VALUE}))?$", code)
@@ -452,8 +468,18 @@ class Translator:
 
     # --- cycles -------------------------------------------------------------------------------------
 
+    def _define_pecking(self, code: str) -> str:
+        if code.startswith("CYCL DEF 1.0"):
+            self._hole, self._modal, self._pecking = "", False, {}
+            return ""
+        found = re.match(rf"CYCL DEF 1\.([1-5]) ?[A-Z ]*\.? ?({_VALUE})$", code)
+        if found is None or self._computes:
+            raise _RefusedError(r.REASON_HOLE)
+        self._pecking[found[1]] = _expression(found[2])
+        return ""
+
     def _define_hole(self, code: str) -> str:
-        self._hole, self._modal = "", False
+        self._hole, self._modal, self._pecking = "", False, {}
         found = _CYCLE.match(code)
         number = int(found[1]) if found else 0
         words = dict(_Q_WORD.findall(code))
@@ -470,6 +496,15 @@ class Translator:
         return " ".join(f"QC{k}={value}" for k, value in enumerate(values) if value)
 
     def _hole_here(self) -> str:
+        if len(self._pecking) == len("12345"):
+            above = self._at["Z"]
+            clearance, depth, stroke, dwell, feed = (_float(self._pecking[k]) for k in "12345")
+            if above is None or clearance is None or depth is None or stroke is None or depth >= 0.0:
+                raise _RefusedError(r.REASON_HOLE)
+            first = min(stroke, -depth)
+            heights = f"{above!r},{above - clearance!r},{clearance!r},,{-depth!r}"
+            back = min(max(-depth / 50.0, 0.6), 7.0)
+            return f"HOLE(83,{feed},{heights},,{first!r},-1,0,0,1,1,,,,{dwell},{back!r})"
         if not self._hole:
             raise _RefusedError(r.REASON_HOLE)
         return self._hole
@@ -495,6 +530,7 @@ class Translator:
         ("CYCL DEF 247", _datum_preset),
         ("CYCL DEF 19", _tilt),
         ("CYCL DEF 9.", _dwell),
+        ("CYCL DEF 1.", _define_pecking),
         ("CYCL DEF 200", _define_hole),
         ("CYCL DEF 201", _define_hole),
         ("CYCL DEF 203", _define_hole),
@@ -585,7 +621,7 @@ def _hole_arguments(number: int, q: dict[str, str], speed: str) -> list[str]:
         if not fast:
             return ["85", feed, *above, dwell, feed, feed if _float(out) == 0.0 else out]
     first, wait_above = f"MINVAL({q['202']},{depth})", q.get("210", "0")
-    return ["83", feed, *above, "", first, "0", "0", wait_above, "1", "1", "", "", "", dwell, clearance]
+    return ["83", feed, *above, "", first, "-1", "0", wait_above, "1", "1", "", "", "", dwell, clearance]
 
 
 def _is_one_stroke(q: dict[str, str]) -> bool:

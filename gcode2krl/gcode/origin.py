@@ -75,7 +75,8 @@ _MARKS: Final = (
             r"^%_N_\w+",
             r"\b(?:MCALL\b[^\n;]*|(?:CYCLE\d{2,4}|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|WORKPIECE)\b)",
             r"\b(?:G500|G700|G710|G64[1-5]|G60[12]|TRAORI|TRAFOOF|SUPA|COMPCAD|COMPOF|FFWON|STOPRE)\b",
-            r"\bMSG(?= *\()|\bGOTO[FB]\b|\bA?(?:TRANS|ROT|MIRROR|SCALE) +[XYZ]\b|\bDEF +(?:REAL|INT|BOOL)\b",
+            r"\bMSG(?= *\()|\bGOTO[FB]\b|\bA?(?:TRANS|ROT|MIRROR|SCALE) +[XYZ]\b",
+            r"\bDEF +(?:REAL|INT|BOOL|STRING|CHAR|AXIS)\b",
             r"\b(?:RND|RNDM|CHF|CHR|CR|TURN) *=|\bT *= *\"|\b[XYZIJK] *=|\bR\d{1,3} *=|\b[XYZ] *= *[AI]C\b",
         ),
     ),
@@ -223,9 +224,7 @@ _FOREIGN: Final = (
         "not-a-part",
         "this is a subprogram of a Sinumerik: PROC takes its numbers from the program that calls it",
         "translate the program that calls it; the subprogram is read from beside that",
-        _pattern(
-            r"\A(?:[ \t\r]*(?:[%;][^\n]*)?\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*\([ \t]*[A-Z]"
-        ),
+        _pattern(r"\A(?:[ \t\r]*(?:[%;][^\n]*)?\n)*[ \t]*(?:N\d+[ \t]*)?PROC[ \t]+\w+[ \t]*\([ \t]*[A-Z]"),
         in_comments=True,
     ),
     _Foreign(

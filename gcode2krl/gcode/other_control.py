@@ -60,7 +60,7 @@ def doubts_of_control(toolpath: Toolpath, mark: Mark | None, dialect: str, rerea
     if difference is None:
         return
     line, what = difference
-    remedy = remaining[0].remedy if remaining else _remedy(other, remaining)
+    remedy = f"--dialect {other}, and {remaining[0].remedy}" if remaining else _remedy(other, remaining)
     yield Issue(
         "warning",
         "other-dialect",

@@ -139,7 +139,7 @@ LABEL = np.dtype(
         ("loop_last", "i8"),
     ]
 )
-"""N and its number, for GOTO, or a number of CASE in its line's segment; sorted by segment, number and word."""
+"""N and its number, for GOTO, sorted by segment, number, word; or a number of CASE in its line's segment."""
 COURSE = np.dtype(
     [
         ("steps", "i8"),  # lines executed

@@ -2,7 +2,7 @@
 
    All begin with RTP, RFP, SDIS, DP, DPR, DTB: rapid to RFP + SDIS, feed to the depth, rapid to RTP. DP is absolute,
    DPR counts from RFP down; DTB is a dwell at the depth in seconds, below 0 in turns of the spindle (SINUMERIK 840D,
-   Programming Guide Cycles, chapter 2). Newer controls have _GMODE, _DMODE and _AMODE behind, whose digits say which of
+   Programming Guide Cycles, chapter 2; the strokes of CYCLE83 are those of the control's own CYCLE83.SPF). Newer controls have _GMODE, _DMODE and _AMODE behind, whose digits say which of
    two arguments counts (SINUMERIK 840D sl, Programming Manual Job Planning, external programming of cycles). */
 
 #include "gcode/siemens_cycles.h"
@@ -23,11 +23,11 @@ enum { SDIR = 6, RPA, RPO, RPAP };                                              
 enum { BY_ARGUMENTS, INCREMENTAL, ABSOLUTE, SECONDS = 1, TURNS };                                     /* of _AMODE */
 enum { AXIS_OF_G17 = 3, ROWS_OF_PECK = 4, ROWS_OF_CYCLE = 6, EVENTS_OF_CYCLE = 8, MOST_PECKS = 100000 };
 static const double SAME_DEPTH = 1e-9, CHIP_MM = 1.0;
-static const double LEAST_ADVANCE_MM = 0.6, MOST_ADVANCE_MM = 7.0, ADVANCES = 50.0;
+static const double LEAST_ADVANCE_MM = 0.6, MOST_ADVANCE_MM = 7.0, ADVANCES = 50.0, ADVANCE_FROM_MM = 30.0;
 
 /* The way of CYCLE83 in programmed units: strokes, and what lies between them. */
 typedef struct {
-    double first, degression, back, first_share, dwell_s, start_dwell_s, last_dwell_s;
+    double first, degression, factor, least, stated_back, first_share, dwell_s, start_dwell_s, last_dwell_s;
     bool leaves; /* the hole behind each stroke; else the chip is broken */
 } Pecks;
 
@@ -117,36 +117,53 @@ static bool take_heights(Block *b, Cycle *c) {
            c->clear >= c->r && idle && c->dwell_s >= 0.0;
 }
 
-/* Find the strokes of CYCLE83. */
+/* Find the strokes of CYCLE83: DAM is what each is less than the one before, or below 0 its share of that. */
 static bool take_pecks(const Block *b, const Cycle *c, Pecks *p) {
-    const double unit_mm = b->state->unit_mm, depth = or_zero(b, RFP) - c->bottom, share = or_zero(b, FRF);
+    const double depth = or_zero(b, RFP) - c->bottom, share = or_zero(b, FRF), last = dwell_of(b, DTD, BY_ARGUMENTS);
+    const double first = depth_below(b, FDEP, FDPR, digit_of_mode(b, 3));
     p->leaves = or_zero(b, VARI) != 0.0;
-    const double advance_mm = lesser(greater(depth * unit_mm / ADVANCES, LEAST_ADVANCE_MM), MOST_ADVANCE_MM);
-    const double stated = or_zero(b, p->leaves ? DIS1 : VRT), last = dwell_of(b, DTD, BY_ARGUMENTS);
-    p->first = depth_below(b, FDEP, FDPR, digit_of_mode(b, 3));
+    p->stated_back = or_zero(b, p->leaves ? DIS1 : VRT);
+    p->first = isnan(first) ? first : lesser(first, depth);
     p->degression = or_zero(b, DAM);
-    p->back = stated > 0.0 ? stated : (p->leaves ? advance_mm : CHIP_MM) / unit_mm;
-    p->first_share = share == 0.0 ? 1.0 : share;
+    p->factor = p->degression < 0.0 ? -p->degression : 1.0;
+    p->least = p->degression < 0.0 ? or_zero(b, MDEP) : p->first;
+    p->first_share = share;
     p->dwell_s = dwell_of(b, PECK_DTB, digit_of_mode(b, 1));
     p->start_dwell_s = dwell_of(b, DTS, digit_of_mode(b, 2));
     p->last_dwell_s = or_zero(b, DTD) == 0.0 ? p->dwell_s : last;
-    return p->first > 0.0 && p->first <= depth + SAME_DEPTH && p->degression >= 0.0 && stated >= 0.0 && share >= 0.0 && share <= 1.0 && or_zero(b, MDEP) >= 0.0 && is_tool_axis(b, PECK_AXN) &&
+    return p->first > 0.0 && p->factor <= 1.0 && p->stated_back >= 0.0 && share > 0.0 && share <= 1.0 &&
+           or_zero(b, MDEP) >= 0.0 && is_tool_axis(b, PECK_AXN) &&
            p->dwell_s >= 0.0 && p->start_dwell_s >= 0.0 && p->last_dwell_s >= 0.0;
 }
 
-/* Return the stroke that follows one: less by the degression, which is the least; the last two of these are alike. */
-static double next_stroke(const Pecks *p, double stroke, double rest) {
-    const double next = p->degression > 0.0 ? greater(stroke - p->degression, p->degression) : stroke;
-    if (p->degression > 0.0 && next == p->degression && rest > next && rest <= 2.0 * next)
-        return 0.5 * rest;
-    return lesser(next, rest);
+/* Return the next stroke where a rest is left; `nominal` is what the one before would have been, then this one. No
+   stroke is less than the degression, or the least: the last two of these are alike. */
+static double next_stroke(const Pecks *p, double *nominal, double rest) {
+    const double degression = p->degression;
+    if (degression > 0.0) {
+        *nominal = greater(*nominal - degression, degression);
+        if (rest <= *nominal)
+            return rest;
+        return rest <= 2.0 * degression ? 0.5 * rest : lesser(*nominal, rest - degression);
+    }
+    *nominal = greater(*nominal * p->factor, p->least);
+    if (*nominal > rest + SAME_DEPTH)
+        return rest;
+    return rest - *nominal >= p->least - SAME_DEPTH ? *nominal : 0.5 * rest;
+}
+
+/* Return how far above a depth the tool goes back in, or back to break the chip. */
+static double back_of(const Block *b, const Pecks *p, double depth) {
+    const double unit_mm = b->state->unit_mm;
+    const double advance_mm = depth * unit_mm <= ADVANCE_FROM_MM ? LEAST_ADVANCE_MM : lesser(depth * unit_mm / ADVANCES, MOST_ADVANCE_MM);
+    return p->stated_back > 0.0 ? p->stated_back : (p->leaves ? advance_mm : CHIP_MM) / unit_mm;
 }
 
 /* Return how many strokes make a hole, MOST_PECKS for more. */
 static int64_t strokes_of(const Pecks *p, double depth) {
     int64_t strokes = 1;
-    for (double stroke = p->first, done = stroke; depth - done > SAME_DEPTH && strokes < MOST_PECKS; strokes++)
-        done += stroke = next_stroke(p, stroke, depth - done);
+    for (double nominal = p->first, done = nominal; depth - done > SAME_DEPTH && strokes < MOST_PECKS; strokes++)
+        done += next_stroke(p, &nominal, depth - done);
     return strokes;
 }
 
@@ -193,7 +210,7 @@ static bool deep_hole(Block *b, const Cycle *c) {
     Pecks p;
     take_pecks(b, c, &p);
     const double slow_mm_s = c->mm_s * p.first_share, reference = or_zero(b, RFP);
-    double stroke = p.first, below = stroke;
+    double nominal = p.first, below = nominal;
     const int64_t strokes = strokes_of(&p, reference - c->bottom);
     if (!has_cycle_room(b, ROWS_OF_CYCLE + ROWS_OF_PECK * strokes, EVENTS_OF_CYCLE))
         return false;
@@ -208,11 +225,11 @@ static bool deep_hole(Block *b, const Cycle *c) {
         if (p.leaves) {
             go_along(b, c, c->r, true, RAPID_MM_S);
             wait_here(b, p.start_dwell_s);
-            go_along(b, c, lesser(at + p.back, c->r), true, RAPID_MM_S);
+            go_along(b, c, lesser(at + back_of(b, &p, below), c->r), true, RAPID_MM_S);
         } else {
-            go_along(b, c, lesser(at + p.back, c->r), true, c->mm_s);
+            go_along(b, c, lesser(at + back_of(b, &p, below), c->r), true, c->mm_s);
         }
-        below += stroke = next_stroke(&p, stroke, at - c->bottom);
+        below += next_stroke(&p, &nominal, at - c->bottom);
     }
     go_along(b, c, c->clear, true, RAPID_MM_S);
     return true;

@@ -52,6 +52,12 @@ PROGRAMS = [
     ("heidenhain", "3 CC X+10 Y+0\n4 C X+20 Y+0 DR- F100\n5 L IX+5 IZ-2\n6 CR X+30 Y+5 R+5 DR+\n7 L M30"),
     (
         "heidenhain",
+        "3 CYCL DEF 1.0 PECKING\n4 CYCL DEF 1.1 SET UP 2\n5 CYCL DEF 1.2 DEPTH -9.5\n6 CYCL DEF 1.3 PECKG 4\n"
+        "7 CYCL DEF 1.4 DWELL 0\n8 CYCLE DEF 1.5 F80\n9 L Z+12 FMAX\n10 L X+5 Y+5 FMAX M99\n11 L IX+9 FMAX\n"
+        "12 CYCL CALL\n13 CC X+24 Y+5\n14 C DR- F90\n15 L M30",
+    ),
+    (
+        "heidenhain",
         "3 LBL 1\n4 L IX+3 FMAX\n5 LBL 2\n6 L IY+1 FMAX\n7 CALL LBL 2 REP 2/2\n8 CALL LBL 1 REP 1/1\n9 L M2",
     ),
     (

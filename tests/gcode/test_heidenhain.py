@@ -123,6 +123,22 @@ def test_cycles_201_203_and_207():
     assert [e.values["m"] for e in found.events if e.kind == "spindle"] == [3, 3, 5, 4, 5, 3, 5]
 
 
+PECKING = (
+    "CYCL DEF 1.0 PECKING\nCYCL DEF 1.1 SET UP 2\nCYCL DEF 1.2 DEPTH -9\nCYCL DEF 1.3 PECKG 5\n"
+    "CYCL DEF 1.4 DWELL 0.5\nCYCL DEF 1.5 F80"
+)
+
+
+def test_cycle_1_begins_where_the_tool_stands():
+    """Strokes of 5 mm from 2 mm below; back in to 0.6 mm above the last depth."""
+    found = read(numbered(f"{PECKING}\nL Z+12 FMAX\nL X+3 FMAX M99"))
+    z = found.position_mm[:, 2].tolist()
+    without_a_move = read(numbered(f"{PECKING}\nL X+3 Z+12 FMAX\nL FMAX M99")).position_mm[:, 2]
+    np.testing.assert_allclose(without_a_move[-5:], z[-5:])
+    np.testing.assert_allclose(z[-6:], [12, 5, 12, 5.6, 1, 12], atol=1e-9)
+    assert found.dwell_s[-2] == 0.5
+
+
 @pytest.mark.parametrize(
     ("lines", "line"),
     [
@@ -137,6 +153,13 @@ def test_cycles_201_203_and_207():
         ("CC X+1 Y+1\nCP IPA+90 DR-", 2),
         ("CALL LBL 1\nL M2\nLBL 1\nL X+1", 1),
         ("L X+1 F100\nRND R5 F50\nL Y+9", 2),
+        ("CYCL DEF 1.0 PECKING\nCYCL CALL", 2),
+        (f"{PECKING}\nL FMAX M89", 7),
+        ("L FMAX M99", 1),
+        (f"{PECKING}\nTOOL CALL 1 Z S900\nCYCL CALL", 8),
+        (f"{PECKING}\nL Z+9 FMAX\nCYCL DEF 7.0 DATUM\nCYCL DEF 7.1 Z+5\nCYCL CALL", 10),
+        ("CC X+1 Y+1\nL X+3 Y+1 FMAX\nCYCL DEF 7.0 DATUM\nCYCL DEF 7.1 X+5\nCP PA+90 DR+", 5),
+        ("CC X+1 Y+1\nL X+3 Y+1 FMAX\nLBL 1\nCP PA+90 DR+\nL X+9 FMAX\nCALL LBL 1 REP 1", 4),
         ("CYCL DEF 247 DATUM ~\n Q339=+0", 1),
         ("CYCL DEF 247 DATUM ~\n Q339=Q5", 1),
         ("CYCL DEF 203 DRILL ~\n Q200=2 ~\n Q201=-9 ~\n Q206=1 ~\n Q202=2 ~\n Q203=0 ~\n Q208=0", 1),

@@ -176,3 +176,17 @@ def test_a_mark_is_looked_for_in_a_time_that_grows_with_the_text(line):
     begun = time.process_time()
     assert control_of(text) is None
     assert time.process_time() - begun < 2.0  # some hundredths; where blanks are passed in two ways, hours
+
+
+def test_a_doubt_about_g41_names_the_dialect_and_the_keys_of_the_cell(tmp_path):
+    contour = "G0 X-30. Y-30.\nG41 D1 G1 X0. Y-20. F800.\nY40.\nX50.\nY0.\nX-20.\nG40 X-30. Y-30.\n"
+    (found,) = doubts(tmp_path, "%\nO0001\n" + MILL + contour + END)
+    assert found.remedy.startswith("--dialect fanuc, and state lead_in")
+
+
+@pytest.mark.parametrize(
+    "text", ["DEF INT NUMBER=2\nG1 X=NUMBER F100\nM30\n", "DEF STRING[9] TEXT\nG0 X1\nM30\n"]
+)
+def test_a_program_that_defines_variables_is_a_sinumerik_s_and_no_krl(text):
+    assert "Sinumerik" in control_of(text.encode()).control.title
+    assert "not-a-part" not in {issue.code for issue in found(text, "sinumerik")}

@@ -26,10 +26,10 @@ def test_cycle83_leaves_the_hole_behind_each_stroke():
 
 def test_cycle83_breaks_the_chip():
     z, feed, _ = heights("CYCLE83(10,0,2,,20,-8,,0,0,0,1,0,3,,1.5)")
-    np.testing.assert_allclose(z, [2, -8, -6.5, -16, -14.5, -20, 10], atol=1e-12)
+    np.testing.assert_allclose(z, [2, -8, -6.5, -14, -12.5, -20, 10], atol=1e-12)
     assert feed == [RAPID, 100, 100, 100, 100, 100, RAPID]
-    z, _, _ = heights("CYCLE83(10,0,2,-16,,-8,,0,0,0,,0)")
-    np.testing.assert_allclose(z, [2, -8, -7, -16, 10], atol=1e-12)
+    z, _, _ = heights("CYCLE83(10,0,2,-24,,-8,,0,0,0,1,0)")
+    np.testing.assert_allclose(z, [2, -8, -7, -16, -15, -20, -19, -24, 10], atol=1e-12)
 
 
 def test_the_last_two_strokes_of_cycle83_are_alike():
@@ -38,8 +38,30 @@ def test_the_last_two_strokes_of_cycle83_are_alike():
     np.testing.assert_allclose(z[1::2], [-10, -17, -21, -24, -26.5, -29], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("first", "less", "least", "depths"),
+    [
+        (8, 0, 0, [8, 14, 20]),
+        (20, 0, 0, [20]),
+        (30, 3, 0, [20]),
+        (8, 3, 0, [8, 13, 16, 18, 20]),
+        (11, 3, 0, [11, 17, 20]),
+        (10, 4, 0, [10, 16, 20]),
+        (8, 5, 0, [8, 13, 16.5, 20]),
+        (8, -1, 0, [8, 16, 20]),
+        (8, -0.5, 1, [8, 12, 14, 15, 16, 17, 18, 19, 19.5, 20]),
+        (8, -0.5, 3, [8, 12, 15, 17.5, 20]),
+    ],
+)
+def test_strokes_of_cycle83(first, less, least, depths):
+    """By DAM, a length or a share of the stroke before; the last two are halved rather than too short."""
+    z, _, _ = heights(f"CYCLE83(10,0,2,-20,,,{first},{less},0,0,1,0,,{least},1)")
+    np.testing.assert_allclose(z[1::2], [-depth for depth in depths], atol=1e-12)
+
+
 def test_the_advance_of_cycle83_grows_with_the_depth():
-    assert heights("CYCLE83(10,0,2,-60,,,30,0,0,0,1,1)")[0][3] == pytest.approx(-28.8)
+    z = heights("CYCLE83(10,0,2,-90,,,30,0,0,0,1,1)")[0]
+    np.testing.assert_allclose(z[3::3], [-29.4, -58.8, -73.5], atol=1e-9)
     assert heights("CYCLE83(10,0,2,-60,,,30,0,0,0,1,1,,,,,5)")[0][3] == pytest.approx(-25)
 
 

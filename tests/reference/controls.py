@@ -9,6 +9,7 @@ differ by
 parameters. What this does not know raises `Unknown`, and the program is not compared.
 """
 
+import functools
 import math
 import re
 
@@ -185,15 +186,19 @@ _SIEMENS = {
 }
 
 
-def _value(text, variables):
-    """Return the value of an expression of a Sinumerik or Heidenhain."""
+@functools.cache
+def _code(text):
     python = re.sub(r"<>", "!=", text.strip().upper())
     python = (
         re.sub(r"\b(AND|OR|NOT)\b", lambda m: m[1].lower(), python).replace("DIV", "//").replace("MOD", "%")
     )
-    python = re.sub(r"(?<![\w.])0+(\d)", r"\1", python)
+    return compile(re.sub(r"(?<![\w.])0+(\d)", r"\1", python), "expression", "eval")
+
+
+def _value(text, variables):
+    """Return the value of an expression of a Sinumerik or Heidenhain."""
     try:
-        return float(eval(python, {"__builtins__": {}}, {**_SIEMENS, **variables}))
+        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS}, variables))
     except Exception as error:
         raise Unknown(text) from error
 
@@ -455,7 +460,7 @@ def _heidenhain_block(code, run, q, state):
         elif to:
             run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
         if re.search(r"\bM99\b", code):
-            run.hole(*state["hole"])
+            run.hole(*_heidenhain_hole(run, state))
         return re.search(r"\bM(?:0?2|30)\b", code) is not None
     if head == "CP" and (m := re.search(r"IPA ?([+-]?[\d.]+)", code)) and float(m[1]) % 360 == 0:
         z = re.search(r"IZ ?([+-]?[\d.]+)", code)
@@ -464,18 +469,29 @@ def _heidenhain_block(code, run, q, state):
     raise Unknown(code)
 
 
+def _heidenhain_hole(run, state):
+    """Return the hole of the cycle in force; that of cycle 1 begins where the tool stands."""
+    if not state.get("pecking"):
+        return state["hole"]
+    top = run.at["Z"]
+    return top, top - state["pecking"]["1"] + state["pecking"]["2"], top
+
+
 def _heidenhain_cycle(code, run, q, state):
     if code.startswith("CYCL CALL"):
         if "POS" in code or "PAT" in code:
             raise Unknown(code)
-        run.hole(*state["hole"])
+        run.hole(*_heidenhain_hole(run, state))
+    elif (m := re.match(r"CYCL DEF 1\.([12])\D*?([+-]?[\d.]+)$", code)) is not None:
+        state["pecking"] = {**state.get("pecking", {}), m[1]: float(m[2])}
     elif re.match(r"CYCL DEF (?:200|201|203|207)\b", code):
         given = {name: _value(value, q) for name, value in re.findall(r"Q(2\d\d) ?= ?([+-]?[\dQ.]+)", code)}
         top = given["203"] + max(given["200"], given.get("204", 0.0))
+        state["pecking"] = {}
         state["hole"] = (given["203"] + given["200"], given["203"] + given["201"], top)
     elif (m := re.match(r"CYCL DEF 7\.\d ([XYZ]) ?([+-]?[\d.]+)$", code)) is not None:
         run.shift[m[1]] = float(m[2])
-    elif not re.match(r"CYCL DEF (?:7\.0|9\.|32|247)", code):
+    elif not re.match(r"CYCL DEF (?:1\.|7\.0|9\.|32|247)", code):
         raise Unknown(code)
     return False
 
