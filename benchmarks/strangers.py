@@ -1,9 +1,10 @@
 """Programs from elsewhere: translated at once, after one round of remedies, or not at all.
 
-``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--tools LIBRARY] [--json]`` runs the command line on every G-code
-file below the folders, each in a process of its own with a time limit, as a user would type it: the built-in
-cell, no options. Where the program is refused, each printed remedy that `remedies` knows is followed once (a
-key in a cell based on the demonstration, an option, the part moved into reach), and it is run again.
+``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--tools LIBRARY] [--json]`` runs the command
+line on every G-code file below the folders, each in a process of its own with a time limit, as a user would
+type it: the built-in cell, no options but --tools. Where the program is refused, each printed remedy that
+`remedies` knows is followed once (a key in a cell based on the demonstration, an option, the part moved into
+reach), and it is run again.
 Programs in a language that is not read yet (expressions, subprograms, cutter compensation, canned cycles,
 probing, turning) are counted apart. The exit code is always 0: figures are printed, not judged.
 """
