@@ -1,9 +1,10 @@
 """Programs from elsewhere: translated at once, after one round of remedies, or not at all.
 
-``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--json]`` runs the command line on every G-code
-file below the folders, each in a process of its own with a time limit, as a user would type it: the built-in
-cell, no options. Where the program is refused, each printed remedy that `remedies` knows is followed once (a
-key in a cell based on the demonstration, an option, the part moved into reach), and it is run again.
+``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--tools LIBRARY] [--json]`` runs the command
+line on every G-code file below the folders, each in a process of its own with a time limit, as a user would
+type it: the built-in cell, no options but --tools. Where the program is refused, each printed remedy that
+`remedies` knows is followed once (a key in a cell based on the demonstration, an option, the part moved into
+reach), and it is run again.
 Programs in a language that is not read yet (expressions, subprograms, cutter compensation, canned cycles,
 probing, turning) are counted apart. The exit code is always 0: figures are printed, not judged.
 """
@@ -161,11 +162,14 @@ def _without_inner_comments(line: bytes) -> bytes:
     return bytes(kept)
 
 
-def try_program(part: Path, limit_s: float) -> Result:
-    """Run a program at once and, where it is refused, once more with its remedies followed."""
+def try_program(part: Path, limit_s: float, always: tuple[str, ...] = ()) -> Result:
+    """Run a program at once and, where it is refused, once more with its remedies followed.
+
+    ``always`` are options of both runs.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        first = attempt(part, folder, (), limit_s)
+        first = attempt(part, folder, always, limit_s)
         codes = tuple(sorted({code for code, _ in first.errors}))
         last_words = tuple(message[:110] for _, message in first.errors[:3])
         if first.exit_code is None:
@@ -182,7 +186,7 @@ def try_program(part: Path, limit_s: float) -> Result:
                 'based_on = "demonstration"\n' + _joined(text for _, text, _ in followed), "utf-8"
             )
             options = tuple(word for _, _, words in followed for word in words)
-            second = attempt(again, folder, ("--cell", str(cell), *options), limit_s)
+            second = attempt(again, folder, ("--cell", str(cell), *options, *always), limit_s)
             names = tuple(dict.fromkeys((*(code for code, _, _ in followed), *changed)))
             if second.exit_code == 0:
                 return Result(
@@ -252,11 +256,13 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--most", type=int, help="At most so many programs of each folder, drawn by --seed.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=300.0, help="Time limit for each run.")
+    parser.add_argument("--tools", type=Path, help="A library of tools for every run.")
     parser.add_argument("--json", action="store_true", help="One JSON object on standard output.")
     options = parser.parse_args(argv)
     results = []
     for part in programs(options.folders, options.most, options.seed):
-        result = try_program(part, options.seconds)
+        always = ("--tools", str(options.tools)) if options.tools is not None else ()
+        result = try_program(part, options.seconds, always)
         results.append(result)
         if not options.json:
             tail = ", ".join(result.remedies or result.codes)

@@ -228,7 +228,8 @@ def _freecad_library(file: Path, unit: str) -> Iterator[FileTool]:
     """FreeCAD's library: numbers and the files of bits, which stand beside it or in the folder ``Bit``."""
     for entry in json.loads(file.read_text(encoding="utf-8-sig"))["tools"]:
         name = Path(str(entry["path"])).name
-        places = [file.parent / name, file.parent.parent / "Bit" / name, file.parent / "Bit" / name]
+        beside = [folder / bits for folder in (file.parent.parent, file.parent) for bits in ("Bit", "bit")]
+        places = [folder / name for folder in (file.parent, *beside)]
         bit = next((place for place in places if place.is_file()), None)
         if bit is None:
             yield FileTool(

@@ -7,7 +7,7 @@ from gcode2krl.cli.on_use import CommandsOnUse
 
 _WHAT = {
     "controller": "Fit how the controller plans to a recorded trace: k, effective CDIS, the law.",
-    "stiffness": "Fit the stiffness of the robot's joints and links to distances of measuring cubes.",
+    "stiffness": "Fit the stiffness of joints and links to distances of measuring cubes, of axes to pulls.",
     "sensor": "Fit weight, centre of gravity and offsets to readings of the unloaded force sensor.",
     "kinematics": "Fit frames, zeros, lengths, axes, bending and play of an arm to measured poses.",
     "force": "Fit the six coefficients of the linear edge law to the measured force of a run.",

@@ -73,7 +73,7 @@ def command(
     point_mm: tuple[float, float, float] | None,
     balance_percent: float,
 ) -> int:
-    """Fit the stiffness of the robot's joints and links to distances of measuring cubes, or to pulls.
+    """Fit the stiffness of joints and links to distances of measuring cubes, of axes to pulls.
 
     MEASUREMENTS is the TOML head that describes cubes, lasers and load, or the CSV with the readings beside
     it; docs/identification.md has the format. A stiffness that the readings do not determine is named, not

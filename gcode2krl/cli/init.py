@@ -79,7 +79,9 @@ def command(
     controller = read_controller(archive) if archive is not None else ArchivedController(source="")
     _say_read(console, controller)
     draft = cell_path.with_name(f"{cell_path.name}{DRAFT}")
-    given = _asked(controller, draft, console) if is_asked else read_answers(answers_path, controller)
+    given = (
+        _asked(controller, draft, console) if answers_path is None else read_answers(answers_path, controller)
+    )
     answers = completed(given, controller)
     text = text_of_cell(answers, controller, SCHEMA)
     cell = _resolved(text, cell_path)

@@ -81,9 +81,15 @@ def test_a_release_of_a_folder_counts_where_its_finding_is(folder, run):
     assert code == 0
 
 
-def test_one_batch_translates_two_dialects_and_a_broken_cell_fails_its_own_part(folder, run):
-    state(folder, '[[files]]\nmatch = "shop/*"\ndialect = "sinumerik"\n')
+def test_one_batch_translates_two_dialects_in_two_cells_and_a_broken_cell_fails_its_own_part(folder, run):
+    (folder / "other.toml").write_text('name = "the other"\n' + CELL, encoding="utf-8")
+    state(
+        folder,
+        'cell = "cell.toml"\n[[files]]\nmatch = "shop/*"\ndialect = "sinumerik"\ncell = "other.toml"\n',
+    )
     assert run("batch", "mill", "shop", "-o", "out").code == 0
+    names = {part: told["cell"]["name"] for part, told in records("out").items()}
+    assert names["shop/b.mpf"] == "the other" != names["mill/a.nc"]
     (folder / "bad.toml").write_text("[stock]\nbox = 3\n", encoding="utf-8")
     state(folder, '[[files]]\nmatch = "shop/*"\ndialect = "sinumerik"\ncell = "bad.toml"\n')
     assert run("batch", "mill", "shop", "-o", "out").code == 1
