@@ -102,7 +102,7 @@ def command(
     from gcode2krl.cli.loads import load_lines
     from gcode2krl.prediction.forecast import load_figures
     from gcode2krl.prediction.limits import cycle_acceleration
-    from gcode2krl.translation.quantities import band_words, quantities
+    from gcode2krl.translation.quantity import band_words, quantities
 
     console = Console(quiet, as_json)
     try:

@@ -11,7 +11,7 @@ from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.krl.external_words import axes_words
 from gcode2krl.prediction.forecast import Forecast
-from gcode2krl.translation.quantities import band_words, quantities
+from gcode2krl.translation.quantity import band_words, quantities
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 

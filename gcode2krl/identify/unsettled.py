@@ -1,4 +1,4 @@
-"""What a KRC4 does beyond the measured corner: what is known in public, what is assumed, what would settle it.
+"""What a KRC4 does beyond the measured corner: known in public, assumed, and what would settle it.
 
 The paper measured two LIN of equal speed and acceleration (Bigliardi et al. 2022). The lines to run are KRL:
 take the positions of the test program (`make-test controller`), stop before and after, and record as for it.
@@ -39,8 +39,8 @@ QUESTIONS = (
     ),
     Question(
         "PTP that blends into LIN",
-        "a PTP in front of a LIN needs a second criterion beside C_PTP: distance, orientation or speed (Beckhoff "
-        "TF5120, structure APO)",
+        "a PTP in front of a LIN needs a second criterion beside C_PTP: distance, orientation or speed "
+        "(Beckhoff TF5120, structure APO)",
         "nothing: no program of gcode2krl blends a PTP",
         ("$APO.CPTP=50", "$APO.CDIS=10", "PTP P2 C_PTP C_DIS", "LIN P3"),
     ),

@@ -85,11 +85,11 @@ class Attempt:
         return self.standard.as_input() if self.standard is not None else None
 
     def quantities(self) -> dict[str, Any] | None:
-        """Return the figures with interval and source, see `quantities.quantities`; None before a motion."""
+        """Return the figures with interval and source, see `quantity.quantities`; None before a motion."""
         forecast = self.forecast
         if forecast is None or not forecast.has_motion:
             return None
-        from gcode2krl.translation.quantities import quantities
+        from gcode2krl.translation.quantity import quantities
 
         return quantities(forecast.loads, forecast.time_s, forecast.targets, forecast.cell)
 

@@ -148,7 +148,7 @@ def test_the_command_reads_a_run_and_writes_the_cell(run, tmp_path):
     (tmp_path / "run" / "run.toml").write_text(
         'prediction = "../prediction"\n[frames]\nforce = "base"\n', encoding="utf-8"
     )
-    (tmp_path / "found.toml").write_text('based_on = "demonstration"\n', encoding="utf-8")
+    (tmp_path / "found.toml").write_text(stock, encoding="utf-8")
     outcome = run("identify", "force", "run", "--json", "--apply", "found.toml", "--plot", "fit.png")
     assert outcome.code == 0, outcome.err
     found = json.loads(outcome.out)["coefficients"]

@@ -16,7 +16,8 @@ CELL = (
 def known(run, tmp_path, band, *command):
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
     (tmp_path / "cell.toml").write_text(CELL.format(band=band), encoding="utf-8")
-    done = run(*command, "part.nc", "--cell", "cell.toml", "-o", "out.src", "--json")
+    output = "out" if command else "out.src"
+    done = run(*command, "part.nc", "--cell", "cell.toml", "-o", output, "--json")
     assert done.code == 0, done.err
     told = json.loads(done.out)
     return told, told["quantities"]
