@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
@@ -23,8 +24,11 @@ from gcode2krl.cutting.engagement import outlines_of
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.milling import raw_field, shaped
 from gcode2krl.cutting.outlook import outlook_of, turned
+from gcode2krl.cutting.records import taken
 from gcode2krl.cutting.sweep import BALL, GRID, LANES, PATH, Grid, Path
 from gcode2krl.tables import Motion, PartHistory, Toolpath, lengths
+
+Heights = NDArray[np.float32]
 
 MOST_BLOCKS = 40_000
 MOST_EVENTS = 150_000
@@ -97,10 +101,12 @@ def _coarse(field: HeightField, most_blocks: int) -> tuple[HeightField, int]:
     return HeightField(height, field.origin_mm, size_mm / (columns, rows), field.bottom_mm), side
 
 
-def _means(field: HeightField, side: int) -> np.ndarray:
+def _means(field: HeightField, side: int) -> Heights:
+    """Return the mean height (r, c) of each block."""
     rows, columns = (count // side for count in field.height_mm.shape)
     heights = np.maximum(field.height_mm, field.bottom_mm).reshape(rows, side, columns, side)
-    return heights.mean(axis=(1, 3), dtype=np.float64).astype(np.float32)
+    means: Heights = heights.mean(axis=(1, 3), dtype=np.float64).astype(np.float32)
+    return means
 
 
 def _path(
@@ -125,12 +131,12 @@ class _Events(NamedTuple):
     block: Ints32
     point: Ints32
     """(e,) the point of the path by which that had happened."""
-    height_mm: np.ndarray
+    height_mm: Heights
 
 
 def _cut_out(
-    grid: Grid, path: Path, time_s: Floats, side: int, raw_mm: np.ndarray, most_events: int
-) -> tuple[_Events, np.ndarray, Ints32]:
+    grid: Grid, path: Path, time_s: Floats, side: int, raw_mm: Heights, most_events: int
+) -> tuple[_Events, Heights, Ints32]:
     """Cut the path out of the grid; return the events, and of each block mean height and last point."""
     mean_mm, last = raw_mm.copy(), np.full(raw_mm.shape, -1, dtype=np.int32)
     begin_s, whole_s = (float(time_s[0]), float(time_s[-1] - time_s[0])) if len(time_s) else (0.0, 0.0)
@@ -146,18 +152,18 @@ def _cut_out(
     parts.append([cut, last.ravel()[cut], mean_mm.ravel()[cut]])
     events = _Events(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     order = np.lexsort((events.point, events.block))
-    events = _Events(*(column[order] for column in events))
+    events = taken(events, order)
     while len(events.block) > most_events:
         slot_s *= 1.5
         slots = ((time_s[events.point] - begin_s) / slot_s).astype(np.int64)
         ends = np.append((events.block[1:] != events.block[:-1]) | (slots[1:] != slots[:-1]), True)
-        events = _Events(*(column[ends] for column in events))
+        events = taken(events, ends)
     order = np.argsort(events.point, kind="stable")
-    return _Events(*(column[order] for column in events)), mean_mm, last
+    return taken(events, order), mean_mm, last
 
 
 def _surface(
-    grid: Grid, path: Path, side: int, last: Ints32, mean_mm: np.ndarray, origin_mm: Floats, size_mm: Floats
+    grid: Grid, path: Path, side: int, last: Ints32, mean_mm: Heights, origin_mm: Floats, size_mm: Floats
 ) -> tuple[Ints32, Floats]:
     """Return for each block (r, c) the point whose sweep left its surface, and its normal (r, c, 3).
 
@@ -198,7 +204,8 @@ def _floor_normals(path: Path, sweep: Ints32, place_mm: Floats) -> Floats:
     outline = -away / distance[:, None] * slope[:, None]
     outline[:, 2] = 1.0
     normal = np.where(is_ball[:, None], -away, outline)
-    return normal / np.maximum(lengths(normal), 1e-12)[:, None]
+    unit: Floats = normal / np.maximum(lengths(normal), 1e-12)[:, None]
+    return unit
 
 
 def _walls(grid: Grid, path: Path) -> tuple[Ints, Ints, Ints32, Floats]:

@@ -1,38 +1,17 @@
 // The part as it stands at a row: a height for each cell of a grid, cut by the core, drawn by the shader.
 
+const MOVING_TRIANGLES = 12000;  // while something moves and a processor draws
 const UNCUT = [205, 192, 160], CUT = [196, 203, 210], NOT_YET = [222, 226, 230], NOT_KNOWN = [150, 158, 166];
 const OFF = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"];  // blue: too much is cut
 const PART_WORDS = { error: "error by deflection (mm)", nominal: "above the nominal part (mm)", force: "force (N)", tool: "tool", plain: "" };
 
-// The fourth colour is a weight: walls are narrow, and shall be seen. Vertices are cells, with two more around: the edge of the stock, and its foot. What lies behind the section is
-// drawn onto it.
+// The fourth colour is a weight: walls are narrow, and shall be seen.
 const PART_VERTEX = `
-precision highp int; precision highp sampler2D;
-uniform sampler2D heights, colours; uniform vec2 low, size; uniform ivec2 cells; uniform float foot; uniform vec3 cut;
-out vec3 place, seen; out vec4 tint;
-vec2 at(ivec2 k) { return low + size * clamp(vec2(k) - 1.5, vec2(0.0), vec2(cells)); }
-ivec2 cell(ivec2 k) { return clamp(k - 2, ivec2(0), cells - 1); }
-float height(ivec2 k) {
-  bool isFoot = k.x <= 0 || k.y <= 0 || k.x >= cells.x + 3 || k.y >= cells.y + 3;
-  return isFoot ? foot : texelFetch(heights, cell(k), 0).r;
-}
+in vec4 tone; out vec3 place, seen; out vec4 tint;
 void main() {
-  int across = cells.x + 4;
-  ivec2 k = ivec2(gl_VertexID % across, gl_VertexID / across);
-  vec2 xy = at(k);
-  float z = height(k);
-  for (int axis = 0; axis < 2; axis++) {
-    if (xy[axis] <= cut[axis]) continue;
-    ivec2 before = k;
-    before[axis] -= 1;
-    float from = at(before)[axis], share = (cut[axis] - from) / max(xy[axis] - from, 1e-6);
-    z = share > 0.0 ? mix(height(before), z, share) : foot;
-    xy[axis] = cut[axis];
-  }
-  place = vec3(xy, min(z, cut.z));
-  tint = texelFetch(colours, cell(k), 0);
-  tint.rgb *= tint.a;
-  vec4 world = modelMatrix * vec4(place, 1.0);
+  place = position;
+  tint = vec4(tone.rgb * tone.a, tone.a);
+  vec4 world = modelMatrix * vec4(position, 1.0);
   seen = world.xyz;
   gl_Position = projectionMatrix * viewMatrix * world;
 }`;
@@ -78,8 +57,10 @@ class Part {
 
   makeMesh() {
     const { width, depth, page } = this, { software } = page.scene;
-    this.heightMap = new THREE.DataTexture(this.heights, width, depth, THREE.RedFormat, THREE.FloatType);
-    this.colours = new THREE.DataTexture(new Uint8Array(4 * width * depth), width, depth);
+    // vertices are cells, with two more around: the edge of the stock, and its foot
+    this.points = new Float32Array(3 * (width + 4) * (depth + 4));
+    this.tones = new Uint8Array(4 * (width + 4) * (depth + 4));
+    this.cut = [Infinity, Infinity, Infinity];
     const span = Math.hypot(width * this.size[0], depth * this.size[1]);
     this.material = new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
@@ -87,18 +68,15 @@ class Part {
       fragmentShader: PART_FRAGMENT,
       side: THREE.DoubleSide,
       uniforms: {
-        heights: { value: this.heightMap },
-        colours: { value: this.colours },
-        low: { value: new THREE.Vector2(...this.low) },
-        size: { value: new THREE.Vector2(...this.size) },
-        cells: { value: [width, depth] },
         foot: { value: this.bottom },
         fine: { value: span / 4000 },
         cut: { value: new THREE.Vector3(1e9, 1e9, 1e9) },
       },
     });
-    this.fine = gridOf(width, depth, 1);
-    this.coarse = software ? gridOf(width, depth, 2) : this.fine;
+    const attributes = { position: new THREE.BufferAttribute(this.points, 3), tone: new THREE.BufferAttribute(this.tones, 4, true) };
+    this.fine = gridOf(width, depth, 1, attributes);
+    const stride = Math.ceil(Math.sqrt((2 * width * depth) / MOVING_TRIANGLES));
+    this.coarse = software && stride > 1 ? gridOf(width, depth, stride, attributes) : this.fine;
     this.mesh = new THREE.Mesh(this.fine, this.material);
     this.mesh.frustumCulled = false;
     this.mesh.matrixAutoUpdate = false;
@@ -128,11 +106,37 @@ class Part {
 
   // Show the part cut off behind a share of its size along an axis; -1 shows it whole.
   section(axis, share) {
-    const { cut } = this.material.uniforms, top = this.cells.raw.reduce((most, one) => Math.max(most, one), -Infinity);
+    const top = this.cells.raw.reduce((most, one) => Math.max(most, one), -Infinity);
     const ends = [...this.low.map((low, k) => [low, low + this.size[k] * [this.width, this.depth][k]]), [this.bottom, top]];
-    cut.value.set(1e9, 1e9, 1e9);
-    if (axis >= 0) cut.value.setComponent(axis, ends[axis][0] + share * (ends[axis][1] - ends[axis][0]));
+    this.cut = [Infinity, Infinity, Infinity];
+    if (axis >= 0) this.cut[axis] = ends[axis][0] + share * (ends[axis][1] - ends[axis][0]);
+    this.material.uniforms.cut.value.set(...this.cut.map((place) => Math.min(place, 1e9)));
+    this.place();
     this.page.scene.changed(false);
+  }
+
+  // Put the vertices where they are; what lies behind the section is put onto it.
+  place() {
+    const { width, depth, points, heights, bottom, low, size, cut } = this, across = width + 4;
+    const along = (count, axis) => Array.from({ length: count + 4 }, (_, k) => low[axis] + size[axis] * Math.min(Math.max(k - 1.5, 0), count));
+    const x = along(width, 0), y = along(depth, 1);
+    const height = (i, j) => {
+      if (i <= 0 || j <= 0 || i >= width + 3 || j >= depth + 3) return bottom;
+      return heights[Math.min(Math.max(j - 2, 0), depth - 1) * width + Math.min(Math.max(i - 2, 0), width - 1)];
+    };
+    const share = (places, k, end) => Math.max((end - places[k - 1]) / Math.max(places[k] - places[k - 1], 1e-6), 0);
+    for (let j = 0, n = 0; j < depth + 4; j++) {
+      for (let i = 0; i < across; i++) {
+        const overX = x[i] > cut[0], overY = y[j] > cut[1];
+        let z = height(i, j);
+        if (overX) { const part = share(x, i, cut[0]); z = part > 0 ? part * z + (1 - part) * height(i - 1, j) : bottom; }
+        if (overY) { const part = share(y, j, cut[1]); z = part > 0 ? part * z + (1 - part) * height(i, j - 1) : bottom; }
+        points[n++] = overX ? cut[0] : x[i];
+        points[n++] = overY ? cut[1] : y[j];
+        points[n++] = Math.min(z, cut[2]);
+      }
+    }
+    this.fine.attributes.position.needsUpdate = true;
   }
 
   get isFinished() { return byId("show-finished").checked; }
@@ -164,11 +168,11 @@ class Part {
       this.heights[cell] = this.height[event];
       this.event[cell] = event;
     }
-    this.heightMap.needsUpdate = true;
+    this.place();
   }
 
   paint(quantity) {
-    const { event, row, lastOf } = this, { steep } = this.cells, data = this.colours.image.data, { columns } = this.page;
+    const { event, row, lastOf } = this, { steep } = this.cells, data = new Uint8Array(4 * this.event.length), { columns } = this.page;
     const off = this.cells[quantity], end = head.part.ends[quantity];
     const scale = head.quantities.find(({ name }) => name === quantity);
     const palette = tableOf(off ? OFF : head.palette);
@@ -183,7 +187,12 @@ class Part {
       else if (off) colour = Number.isNaN(off[cell]) ? NOT_KNOWN : palette[Math.round(127.5 * (1 + Math.min(Math.max(off[cell] / end, -1), 1)))];
       data[4 * cell] = colour[0]; data[4 * cell + 1] = colour[1]; data[4 * cell + 2] = colour[2]; data[4 * cell + 3] = one < 0 ? 6 : 50 + 205 * (steep[cell] || 0);
     }
-    this.colours.needsUpdate = true;
+    const { width, depth, tones } = this, words = new Uint32Array(data.buffer), out = new Uint32Array(tones.buffer);
+    for (let j = 0, n = 0; j < depth + 4; j++) {
+      const row = Math.min(Math.max(j - 2, 0), depth - 1) * width;
+      for (let i = 0; i < width + 4; i++) out[n++] = words[row + Math.min(Math.max(i - 2, 0), width - 1)];
+    }
+    this.fine.attributes.tone.needsUpdate = true;
   }
 
   legend(quantity) {
@@ -240,9 +249,9 @@ class Part {
     const from = camera.position.clone().applyMatrix4(inverse);
     const through = new THREE.Vector3((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight, 0.5).unproject(camera);
     const way = through.applyMatrix4(inverse).sub(from).normalize();
-    const { cut } = this.material.uniforms, top = this.heights.reduce((most, one) => Math.max(most, one), -Infinity);
+    const top = this.heights.reduce((most, one) => Math.max(most, one), -Infinity);
     const high = [this.low[0] + this.size[0] * this.width, this.low[1] + this.size[1] * this.depth, top];
-    const box = new THREE.Box3(new THREE.Vector3(...this.low, this.bottom), new THREE.Vector3(...high).min(cut.value));
+    const box = new THREE.Box3(new THREE.Vector3(...this.low, this.bottom), new THREE.Vector3(...high.map((end, k) => Math.min(end, this.cut[k]))));
     const enters = new THREE.Ray(from, way).intersectBox(box, new THREE.Vector3());
     if (!enters) return -1;
     const step = Math.min(...this.size) / 3, at = enters.addScaledVector(way, 1e-4);
@@ -259,8 +268,8 @@ const signed = (value) => (Number.isFinite(value) ? `${value < 0 ? "-" : "+"}${M
 
 const tableOf = (palette) => Array.from({ length: 256 }, (_, k) => mixed(palette, k / 255, 0));
 
-// Triangles between every cell of a grid, or every second one, in both directions; the edges are always there.
-function gridOf(width, depth, stride) {
+// Triangles between every so many cells of a grid in both directions; the edges are always there.
+function gridOf(width, depth, stride, attributes) {
   const kept = (count) => Array.from({ length: count + 4 }, (_, k) => k).filter((k) => k < 3 || k > count || (k - 2) % stride === 0);
   const x = kept(width), y = kept(depth), corners = new Uint32Array(6 * (x.length - 1) * (y.length - 1));
   let n = 0;
@@ -273,5 +282,6 @@ function gridOf(width, depth, stride) {
   }
   const shape = new THREE.BufferGeometry();
   shape.setIndex(new THREE.BufferAttribute(corners, 1));
+  Object.entries(attributes).forEach(([name, values]) => shape.setAttribute(name, values));
   return shape;
 }

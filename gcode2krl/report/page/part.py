@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.report.page.packing import packed
 from gcode2krl.report.part_error import scale_end
 from gcode2krl.tables import PartHistory
@@ -32,9 +32,14 @@ def drawn_part(
         nominal part; NaN where that is not known, None where nothing is.
     """
     order = _by_visit(history.cell)
-    columns = {"cell": (history.cell, 1.0), "row": (_row(rows, history.sample), 1.0)}
-    columns["height"] = (history.height_mm, _HEIGHT_STEP_MM)
-    events, of_events = packed({name: (values[order], step) for name, (values, step) in columns.items()})
+    row = _row(rows, history.sample)
+    events, of_events = packed(
+        {
+            "cell": (history.cell[order], 1.0),
+            "row": (row[order], 1.0),
+            "height": (history.height_mm[order], _HEIGHT_STEP_MM),
+        }
+    )
     maps = {"error": error_mm, "nominal": nominal_mm}
     drawn = {name: off for name, off in maps.items() if off is not None}
     left = np.where(history.left_by >= 0, _row(rows, history.left_by), -1)
@@ -69,7 +74,8 @@ def worst_of_cells(off_mm: Floats, shape: tuple[int, ...]) -> Floats:
     worst = np.zeros((2, *shape))
     np.maximum.at(worst[0], (row, column), off_mm)
     np.minimum.at(worst[1], (row, column), off_mm)
-    return np.where(worst[0] >= -worst[1], worst[0], worst[1])
+    farthest: Floats = np.where(worst[0] >= -worst[1], worst[0], worst[1])
+    return farthest
 
 
 def _row(rows: Ints, sample: Ints) -> Ints:
@@ -77,7 +83,7 @@ def _row(rows: Ints, sample: Ints) -> Ints:
     return np.minimum(np.searchsorted(rows, sample), len(rows) - 1)
 
 
-def _by_visit(cell: Ints) -> Ints:
+def _by_visit(cell: Ints32) -> Ints:
     """Return the order of events in which all first ones of the cells come first, then all second ones, ….
 
     Neighbours then differ little, as a tool passes one after the other; this halves their size.
