@@ -9,6 +9,7 @@
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -191,6 +192,8 @@ class DeflectionLimit:
             size_mm = lengths(deflection.deflection_base_mm)
             across_mm = lengths(deflection.correction_base_mm)
         self.absurd = _absurd_deflection(deflection, size_mm, reached, line)
+        if self.absurd is not None and self._known:  # what nobody stated refuses no program
+            self.absurd = replace(self.absurd, severity="warning")
         tool = np.zeros(len(line), dtype=np.int32)
         self.bent.take(np.nan_to_num(size_mm), line, tool)
         self.across.take(np.nan_to_num(across_mm), line, tool)

@@ -10,6 +10,7 @@ from gcode2krl.compliance import assumed_stiffness, displace, missing_stiffness,
 from gcode2krl.compliance.estimate import ARM, estimated, left_out, published
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.online.compensator import build_compensator
+from gcode2krl.prediction.limits import DeflectionLimit
 from gcode2krl.tables import Deflection
 
 TOOL = {"1": {"diameter_mm": 10.0, "teeth": 2, "length_mm": 100.0}}
@@ -76,3 +77,11 @@ def test_no_robot_is_moved_by_an_estimate():
             refuse_unsure(sure, cell)
         with pytest.raises(NotUnderstoodError, match="rigid"):
             build_compensator(cell, cell.online, tool=1, load_frame="base")
+
+
+@pytest.mark.parametrize(("known", "severity"), [("", "error"), ("estimated", "warning")])
+def test_an_absurd_deflection_by_an_estimate_refuses_nothing(known, severity):
+    limit = DeflectionLimit(cell_of("KR 6 R900-2"), known)
+    bent = Deflection(deflection_base_mm=np.full((1, 3), 200.0), correction_base_mm=np.zeros((1, 3)))
+    limit.take(bent, np.ones(1, dtype=bool), np.ones(1, dtype=np.int32))
+    assert limit.absurd.severity == severity
