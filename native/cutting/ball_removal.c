@@ -30,13 +30,6 @@ typedef struct {
     int32_t first[SW_LANES], after[SW_LANES];
 } Block;
 
-/* Return the part of a cell that a coordinate lies behind the middle of the one that it is counted from. */
-static float place_in(double at, double origin, double size, int64_t shift, int64_t *to_grid) {
-    const double cells = (at - origin) / size - 0.5, whole = floor(cells);
-    *to_grid = (int64_t)whole - shift;
-    return (float)(cells - whole);
-}
-
 static Lines lines_across(const Grid *grid, const Sweep *sweep) {
     const int64_t rows = grid->height.rows, columns = grid->height.columns - SW_LANES;
     const float dx = (float)grid->dx_mm, dy = (float)grid->dy_mm, ex = (float)sweep->ex, ey = (float)sweep->ey;

@@ -8,6 +8,7 @@ in front of a convex cutter was inside it before. */
 #include "cutting/node.h"
 
 #include "cutting/collisions.h"
+#include "cutting/removal.h"
 #include "cutting/walls.h"
 
 #define STRAIGHT 0.03 /* sine of the angle in plan below which a path counts as straight */
@@ -73,6 +74,8 @@ Sample sample_at(const Reader *reader, int64_t i, bool is_own) {
     sample.outline = outline_of(strip->path, sample.tool);
     sample.bottom = grid->bottom_mm - sample.z;
     set_heading(&sample, &CELL(samples->direction, i, 0));
+    if (leaves_disc(strip->path, reader->lag, AT(strip->cutters->lag_mm, sample.tool)))
+        sample.disc = place_of(strip->path, reader->lag);
     sample.moves = sample.chip.sin_gamma != 0.0 || sample.chip.cos_gamma != 0.0;
     if (!is_own)
         return sample;
@@ -80,7 +83,7 @@ Sample sample_at(const Reader *reader, int64_t i, bool is_own) {
     if (sample.moves)
         AT(result->ramp_rad, i) = atan2(sample.chip.sin_gamma, sample.chip.cos_gamma);
     if (sample.chip.sin_gamma > 0.0) {
-        const double centre = height_at(grid, strip->path, sample.x, sample.y);
+        const double centre = top_at(grid, strip->path, &sample, sample.x, sample.y);
         const double below = centre - greater(sample.z, grid->bottom_mm);
         AT(result->centre_mm, i) = below > FEEL_MM ? below : 0.0;
     }

@@ -17,7 +17,7 @@ static void apply(const Strip *strip, int64_t k, Range near, double *rapid_mm) {
     const double a = CELL(path->position_mm, k - 1, near.axis), b = CELL(path->position_mm, k, near.axis);
     if (greater(a, b) < near.low || lesser(a, b) > near.high)
         return;
-    const double cut_mm = remove_sweep(strip->grid, path, k);
+    const double cut_mm = remove_sweep(strip->grid, path, k, AT(strip->cutters->lag_mm, AT(path->tool, k)));
     draw_walls(strip->grid, path, k);
     if (AT(path->rapid, k))
         *rapid_mm = cut_mm;

@@ -6,7 +6,6 @@
 
 #define NO_LENGTH_MM 1e-9
 #define LEAST_ONWARD 2.0 /* how far a sweep goes on for what it goes aside, if it follows the one before */
-#define JOINT_MM 1e-4    /* room for rounding at the joint of two sweeps */
 
 enum { REFRESH = 48 }; /* visits after which the bound of a block is computed again */
 
@@ -31,7 +30,17 @@ static void join(const Path *path, int64_t k, Sweep *sweep) {
     sweep->wedge = JOINT_MM + radius * (turn + fabs(sweep->next_sink) * (sqrt(2.0 * turn + turn * turn) + turn * turn));
 }
 
-static Sweep sweep_to(const Path *path, int64_t k) {
+bool leaves_disc(const Path *path, int64_t k, double lag_mm) {
+    const int64_t next = k + 1;
+    if (k < 1 || next >= path->position_mm.rows || AT(path->first, k) || AT(path->first, next) ||
+        AT(path->rapid, k) || AT(path->rapid, next) || outline_of(path, AT(path->tool, k))->kind == SW_BALL)
+        return false;
+    const double *a = place_of(path, k - 1), *b = place_of(path, k), *c = place_of(path, next);
+    return b[2] < a[2] && c[2] < b[2] && AT(path->way_mm, next) - AT(path->way_mm, k) <= lag_mm &&
+           squared(b[0] - a[0]) + squared(b[1] - a[1]) > squared(NO_LENGTH_MM);
+}
+
+static Sweep sweep_to(const Path *path, int64_t k, double lag_mm) {
     const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const Outline *outline = outline_of(path, AT(path->tool, k));
     Sweep sweep = {.outline = outline, .ax = a[0], .ay = a[1], .az = a[2], .ex = 1.0};
@@ -48,6 +57,8 @@ static Sweep sweep_to(const Path *path, int64_t k) {
     sweep.follows = k > 1 && !AT(path->first, k - 1);
     if (outline->kind == SW_BALL)
         join(path, k, &sweep);
+    else
+        sweep.goes_on = leaves_disc(path, k, lag_mm);
     return sweep;
 }
 
@@ -61,7 +72,7 @@ static void visit(const Grid *grid, Cells rows, Cells columns) {
             }
 }
 
-double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
+double remove_sweep(const Grid *grid, const Path *path, int64_t k, double lag_mm) {
     const double *a = place_of(path, k - 1), *b = place_of(path, k);
     const double radius = outline_of(path, AT(path->tool, k))->radius;
     const double x_low = lesser(a[0], b[0]) - radius, x_high = greater(a[0], b[0]) + radius;
@@ -72,7 +83,7 @@ double remove_sweep(const Grid *grid, const Path *path, int64_t k) {
     const Cells columns = columns_between(grid, x_low, x_high, grid->height.columns - SW_LANES);
     if (rows.first >= rows.after || columns.first >= columns.after)
         return 0.0;
-    const Sweep sweep = sweep_to(path, k);
+    const Sweep sweep = sweep_to(path, k, lag_mm);
     const double worst = AT(path->rapid, k) ? cut_off_by(grid, &sweep, rows) : 0.0;
     if (sweep.outline->kind == SW_BALL)
         lower_below_ball(grid, &sweep);

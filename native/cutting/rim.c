@@ -27,7 +27,7 @@ static double edge_between(const Strip *strip, const Sample *sample, const Ring 
         const double middle = 0.5 * (low + high);
         const double x = sample->x + rim->r * between(rim->east[j - 1], rim->east[j], middle);
         const double y = sample->y + rim->r * between(rim->north[j - 1], rim->north[j], middle);
-        double height = height_at(strip->grid, strip->path, x, y);
+        double height = top_at(strip->grid, strip->path, sample, x, y);
         for (int past = 0; past < sample->recent_count; past++)
             height = lesser(height, sweep_height(&sample->recent[past], sample->outline, x, y, 0.0));
         const double depth = depth_above(height - sample->z, foot);

@@ -11,10 +11,10 @@ Loops over bins have no branches, so that the compiler takes several bins at onc
 
 enum { CHUNK = ED_CHUNK }; /* bins that are worked on together; arrays of bins have so many to spare */
 
-/* A range of bins: where the cells stand in memory, and the distances of their middles from the axis. */
+/* A range of bins: where the cells stand in memory, and their middles as seen from the axis. */
 typedef struct {
     int32_t at[CHUNK];
-    float radius[CHUNK];
+    float x[CHUNK], y[CHUNK];
 } Chunk;
 
 /* The cells about a sample: their size, its place in its own, in cells, and its own in memory; the grid, counted from
@@ -83,7 +83,8 @@ static void list_cells(const Ground *ground, const Ring *ring, int64_t first, Ch
         u = u < on.high_u ? u : on.high_u;
         v = v < on.high_v ? v : on.high_v;
         chunk->at[j] = v * on.stride + u;
-        chunk->radius[j] = sqrtf(x * x + y * y);
+        chunk->x[j] = x;
+        chunk->y[j] = y;
     }
 }
 
@@ -96,8 +97,19 @@ static void stand_above_cutter(const Outline32 *outline, const Chunk *chunk, flo
     const Outline32 cutter = *outline;
     const float feel = (float)FEEL_MM;
     for (int32_t j = 0; j < CHUNK; j++) {
-        const float own = tops[j] - surface_at(&cutter, chunk->radius[j]), plain = tops[j] - height;
+        const float r = sqrtf(chunk->x[j] * chunk->x[j] + chunk->y[j] * chunk->y[j]);
+        const float own = tops[j] - surface_at(&cutter, r), plain = tops[j] - height;
         above[j] = (own <= feel) | (own < 2.0f * fabsf(own - plain)) ? own : plain;
+    }
+}
+
+/* Lower the tops of CHUNK bins to `Sample.disc`; such a cell has no wall. */
+static void lower_to_disc(const Sample *sample, const Chunk *chunk, float *restrict tops) {
+    const float x = (float)(sample->x - sample->disc[0]), y = (float)(sample->y - sample->disc[1]);
+    const float top = (float)(sample->disc[2] - sample->z), square = (float)squared(sample->outline->bottom - JOINT_MM);
+    for (int32_t j = 0; j < CHUNK; j++) {
+        const float u = x + chunk->x[j], v = y + chunk->y[j];
+        tops[j] = (u * u + v * v < square) & (top < tops[j]) ? top : tops[j];
     }
 }
 
@@ -107,7 +119,7 @@ static void correct_at_wall(const Grid *grid, const Path *path, const Sample *sa
     const Cell cell = cell_at(grid, x, y);
     if (!is_inside(grid, cell) || CELL(grid->wall, cell.row, cell.column) < 0)
         return;
-    const double top = beside_wall(grid, path, CELL(grid->wall, cell.row, cell.column), cell, x, y);
+    const double top = top_at(grid, path, sample, x, y);
     ring->tops[j] = (float)(top - sample->z);
     ring->above[j] = ring->tops[j] - (float)ring->height;
 }
@@ -128,6 +140,8 @@ void read_cells(const Grid *grid, const Path *path, const Sample *sample, const 
             no_wall &= AT(walls, at);
             tops[j] = (float)((double)AT(heights, at) - z);
         }
+        if (sample->disc)
+            lower_to_disc(sample, &chunk, tops);
         if (ring->above != ring->tops)
             stand_above_cutter(&outline, &chunk, (float)ring->height, tops, ring->above + first);
         if (no_wall >= 0)

@@ -19,6 +19,7 @@ typedef struct {
     const Outline *outline;
     Way recent[MOST_RECENT]; /* sweeps that the field does not show yet */
     int recent_count;
+    const double *disc; /* where the field does not show what the cutter's flat bottom has cut, NULL: nowhere */
 } Sample;
 
 /* A range of bins. */

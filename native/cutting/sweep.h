@@ -11,6 +11,8 @@ what else comes from Python are declared in gcode2krl/cutting/sweep.py. */
 
 /* Material thinner than this is rounding of the path, not material. */
 #define FEEL_MM 1e-3
+/* Room for rounding at the joint of two sweeps: what one leaves to the other is so much smaller. */
+#define JOINT_MM 1e-4
 #define TURN (2.0 * PI)
 
 /* A row of Path.outlines: the cutter's lower outline; the corner arc ends at (arc_radius, arc_top), above it

@@ -13,7 +13,7 @@ typedef struct {
     const Outline *outline;
     double ax, ay, az, ex, ey, length, slope, sink;
     bool follows;      /* the sweep before has cut what is below the cutter at the start */
-    bool goes_on;      /* the next sweep cuts what is ahead of the end */
+    bool goes_on;      /* the next sweep cuts what is ahead of a ball's end, what is below another cutter's end */
     double next_sink;  /* of the next sweep, if it goes on */
     double wedge;      /* between the planes across both at their joint, in plan, which this sweep cuts */
 } Sweep;
@@ -35,6 +35,13 @@ static inline float root32(float x) { return sqrtf(x > 0.0f ? x : 0.0f); }
 static inline float min32(float a, float b) { return a < b ? a : b; }
 
 static inline float max32(float a, float b) { return a > b ? a : b; }
+
+/* Return the part of a cell that a coordinate lies behind the middle of the one that it is counted from. */
+static inline float place_in(double at, double origin, double size, int64_t shift, int64_t *to_grid) {
+    const double cells = (at - origin) / size - 0.5, whole = floor(cells);
+    *to_grid = (int64_t)whole - shift;
+    return (float)(cells - whole);
+}
 
 static inline Sweep32 in_single(const Sweep *sweep) {
     const Outline *outline = sweep->outline;

@@ -25,6 +25,17 @@ double height_at(const Grid *grid, const Path *path, double x, double y) {
     return beside_wall(grid, path, sweep, cell, x, y);
 }
 
+double top_at(const Grid *grid, const Path *path, const Sample *sample, double x, double y) {
+    const Cell cell = cell_at(grid, x, y);
+    if (sample->disc && is_inside(grid, cell) && CELL(grid->height, cell.row, cell.column) > sample->disc[2]) {
+        const double u = grid->x_mm + ((double)(cell.column + grid->column) + 0.5) * grid->dx_mm - sample->disc[0];
+        const double v = grid->y_mm + ((double)(cell.row + grid->row) + 0.5) * grid->dy_mm - sample->disc[1];
+        if (u * u + v * v < squared(sample->outline->bottom - JOINT_MM))
+            return sample->disc[2];
+    }
+    return height_at(grid, path, x, y);
+}
+
 double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell, double x, double y) {
     const double here = CELL(grid->height, cell.row, cell.column);
     const Way way = way_between(place_of(path, sweep - 1), place_of(path, sweep));

@@ -7,10 +7,13 @@ that sweep is noted in Grid.wall, and a point of the cell is looked up on the si
 #ifndef CUTTING_WALLS_H
 #define CUTTING_WALLS_H
 
-#include "cutting/sweep.h"
+#include "cutting/sample.h"
 
 /* Return the top of the material at a point: of its cell, or beside the wall that runs through it. */
 double height_at(const Grid *grid, const Path *path, double x, double y);
+
+/* The same for the cutter at a sample: where the field does not show what has been cut at its disc, the height of that. */
+double top_at(const Grid *grid, const Path *path, const Sample *sample, double x, double y);
 
 /* Return the height on the point's side of the wall that a sweep left in the cell. */
 double beside_wall(const Grid *grid, const Path *path, int64_t sweep, Cell cell, double x, double y);
