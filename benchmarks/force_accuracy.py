@@ -1,6 +1,6 @@
 """What the default sizes of cells cost in force, against the finest: cells of D/160, every sample read.
 
-Six programs, each with the tool it is meant for, in a stated block. Printed for each: by how much the force
+Seven programs, each with the tool it is meant for, in a stated block. Printed for each: by how much the force
 differs at the same times, RMS over the samples that cut as a share of their RMS force; the bias of the mean
 size; the largest force against the finest's; the share of samples where only one of both cuts.
 
@@ -91,16 +91,23 @@ def bull_nose() -> Program:
     return Program(f"G0 X-12 Y0\nG1 Z-2 F400\nF1500\n{lines}", tool, [[0, -8, -20], [60, 40, 0]])
 
 
-def ball() -> Program:
-    def wave(x: float, y: float) -> float:
-        return -3.0 + 2.0 * math.sin(math.tau * x / 40) + math.sin(math.tau * y / 30)
+def wave(x: float, y: float) -> float:
+    return -3.0 + 2.0 * math.sin(math.tau * x / 40) + math.sin(math.tau * y / 30)
 
+
+def thin() -> Program:
+    """Rows so close that a flat cutter meets thin slivers beside it and below its bottom."""
+    lines = "\n".join(rows(0.8, 0.6, wave))
+    return Program(f"G0 X-12 Y0\nG1 Z-3 F400\nF3000\n{lines}", flat(), [[0, -8, -20], [60, 40, 0]])
+
+
+def ball() -> Program:
     lines = "\n".join(rows(0.8, 0.6, wave))
     tool = {"kind": "ball", "diameter_mm": 16, "teeth": 2}
     return Program(f"G0 X-12 Y0\nG1 Z-3 F400\nF3000\n{lines}", tool, [[0, -8, -20], [60, 40, 0]])
 
 
-PROGRAMS = {each.__name__: each for each in (raster, pocket, ramp, drill, bull_nose, ball)}
+PROGRAMS = {each.__name__: each for each in (raster, pocket, ramp, drill, bull_nose, ball, thin)}
 
 
 def cell_of(program: Program, cell_mm: float | None) -> Cell:

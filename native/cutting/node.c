@@ -20,7 +20,7 @@ typedef struct {
 } Tolerance;
 
 /* A ball's arcs are known to a bin of each of its rings, but its force has no jumps. */
-static const Tolerance ON_BALL = {0.3, 0.05, 0.15}, ON_OTHER = {0.05, 0.05, 0.05};
+static const Tolerance ON_BALL = {0.3, 0.05, 0.15}, ON_OTHER = {0.3, 0.1, 0.15};
 
 enum { LOADS = sizeof(Load) / sizeof(double) };
 
@@ -130,8 +130,10 @@ void write_row(const Reader *reader, const Sample *sample, int64_t i, const Node
     const double f_z_mm = AT(reader->samples->f_z_mm, i);
     if (a->arc_count == 0)
         return;
-    for (int64_t k = 0; k < 2 * a->arc_count; k++)
-        CELL(result->phi_rad, i, k) = between(a->phi_rad[k], b->phi_rad[k], share);
+    const Node *nearest = share > 0.5 ? b : a;
+    for (int64_t k = 0; k < 2 * nearest->arc_count; k++)
+        CELL(result->phi_rad, i, k) = a->arc_count == b->arc_count ? between(a->phi_rad[k], b->phi_rad[k], share)
+                                                                   : nearest->phi_rad[k];
     AT(result->a_p_mm, i) = between(a->a_p_mm, b->a_p_mm, share);
     AT(result->a_e_mm, i) = between(a->a_e_mm, b->a_e_mm, share);
     if (!(f_z_mm > 0.0))
@@ -153,12 +155,16 @@ static double squares_apart(const Load *a, const Load *b) {
     return squared(a->feed - b->feed) + squared(a->normal - b->normal) + squared(a->axial - b->axial);
 }
 
-/* Tell whether a node has as many arcs as two others, in about the places between theirs. */
-static bool has_arcs_between(const Node *node, const Node *a, const Node *b, double share, double most_rad) {
-    if (a->arc_count != b->arc_count || a->arc_count != node->arc_count)
+/* Return where the contact of a node begins or ends. */
+static double end_of(const Node *node, bool last) { return node->phi_rad[last ? 2 * node->arc_count - 1 : 0]; }
+
+/* Tell whether three nodes are in contact, one from about between the ends of two others, or none is. */
+static bool has_ends_between(const Node *node, const Node *a, const Node *b, double share, double most_rad) {
+    const bool is_in_air = node->arc_count == 0;
+    if (is_in_air != (a->arc_count == 0) || is_in_air != (b->arc_count == 0))
         return false;
-    for (int64_t k = 0; k < 2 * a->arc_count; k++)
-        if (fabs(between(a->phi_rad[k], b->phi_rad[k], share) - node->phi_rad[k]) > most_rad)
+    for (int last = 0; last < 2 && !is_in_air; last++)
+        if (fabs(between(end_of(a, last), end_of(b, last), share) - end_of(node, last)) > most_rad)
             return false;
     return true;
 }
@@ -167,7 +173,7 @@ bool lies_between(const Reader *reader, int64_t i, const Node *node, const Node 
     const Samples *samples = reader->samples;
     const double *law = reader->strip->law;
     const Tolerance *most = outline_of(reader->strip->path, AT(samples->tool, i))->kind == SW_BALL ? &ON_BALL : &ON_OTHER;
-    if (!has_arcs_between(node, a, b, share, most->arc_rad) || !has_arcs_between(b, a, a, 0.0, most->arc_rad))
+    if (!has_ends_between(node, a, b, share, most->arc_rad) || !has_ends_between(b, a, a, 0.0, most->arc_rad))
         return false;
     const double scale = feed_scale(law, greater(AT(samples->f_z_mm, i), 0.0));
     const Load at_a = load_between(a, a, 0.0, scale), at_b = load_between(b, b, 0.0, scale);

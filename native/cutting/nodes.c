@@ -31,6 +31,11 @@ static bool changes(const Samples *samples, Bools rapid, int64_t i) {
            dot(before, before) == 0.0 || dot(here, here) == 0.0;
 }
 
+/* Tell whether a tool begins or ceases to sink at sample i: its bottom cuts only while it does. */
+static bool dips(const Samples *samples, int64_t i) {
+    return (row_of(samples->direction, i - 1).z < 0.0) != (row_of(samples->direction, i).z < 0.0);
+}
+
 /* Tell whether the path has turned too much at sample i since a node. */
 static bool has_turned(const Samples *samples, int64_t node, int64_t i) {
     return dot(row_of(samples->direction, i), row_of(samples->direction, node)) < TURN_COSINE;
@@ -66,6 +71,8 @@ EXPORT void cutting_mark_nodes(const Samples *samples, Bools rapid, Floats apart
             settled = way_mm + AT(new_mm, tool);
             AT(node, i - 1) = 1;
         }
+        if (dips(samples, i))
+            AT(node, i - 1) = AT(node, i) = 1;
         const int64_t near = apart > 0.0 ? at_multiple(samples, i, apart) : i;
         if (near >= 0)
             AT(node, near) = 1;
