@@ -101,36 +101,36 @@ class Cell(Section):
     based_on: OneLine = ""
     """The cell whose values are taken over: ``demonstration`` or another cell file."""
     verified: Verified | None = None
-    robot: Robot = Robot()
-    controller: Controller = Controller()
+    robot: Robot = Robot.model_construct()
+    controller: Controller = Controller.model_construct()
     machine: Machine | None = None
     """The machine tool that a five-axis program was made for."""
     tool: dict[ToolNumber, Tool] = Field(default_factory=dict)
     mounted_tool: Annotated[int, Field(strict=True, ge=1, le=99999)] | None = None
     """The tool in the spindle when the program starts without a T word."""
-    frames: Frames = Frames()
+    frames: Frames = Frames.model_construct()
     work_offsets: dict[Annotated[str, Field(pattern=_WORK_OFFSET)], Frame] = Field(default_factory=dict)
     """Zeros of the program; a Fanuc's G54.1 P3 is ``G54.1P3``."""
     external: dict[ExternalName, ExternalAxis] = Field(default_factory=dict)
     """Axes beside A1 to A6."""
-    home: Home = Home()
-    clearance: Clearance = Clearance()
+    home: Home = Home.model_construct()
+    clearance: Clearance = Clearance.model_construct()
     material: Material | None = None
     stock: Stock | None = None
     table: Table | None = None
     obstacle: Annotated[tuple[Obstacle, ...], Field(max_length=100)] = ()
     """What stands in the cell."""
-    collision: Collision = Collision()
+    collision: Collision = Collision.model_construct()
     cables: Cables | None = None
-    limits: ResultLimits = ResultLimits()
-    load: Load = Load()
-    compliance: Compliance = Compliance()
-    pilot: Pilot = Pilot()
-    online: Online = Online()
-    spindle: Spindle = Spindle()
+    limits: ResultLimits = ResultLimits.model_construct()
+    load: Load = Load.model_construct()
+    compliance: Compliance = Compliance.model_construct()
+    pilot: Pilot = Pilot.model_construct()
+    online: Online = Online.model_construct()
+    spindle: Spindle = Spindle.model_construct()
     effects: tuple[EffectEntry, ...] = ()
     guard_inputs: tuple[GuardInput, ...] = ()
-    program: Program = Program()
+    program: Program = Program.model_construct()
     m_code: dict[Annotated[str, Field(pattern=r"^M(0|[1-9][0-9]{0,3})$")], str] = Field(default_factory=dict)
     """KRL (Jinja2) for each M-code, ``M3 = "…"``; an M-code without an entry is refused."""
     tool_change: str = ""

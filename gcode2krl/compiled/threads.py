@@ -1,11 +1,13 @@
 """Work shared out to threads: numpy and the compiled core release the interpreter, so threads suffice."""
 
-import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -20,7 +22,8 @@ def cores() -> int:
     """Return how many threads to use: what the environment says, one in a pool's worker, else one a core."""
     if named := os.environ.get(THREADS_VARIABLE):
         return int(named)
-    return 1 if multiprocessing.parent_process() else usable_cores()
+    multiprocessing = sys.modules.get("multiprocessing")  # a pool's worker has it
+    return 1 if multiprocessing is not None and multiprocessing.parent_process() else usable_cores()
 
 
 def usable_cores() -> int:
@@ -37,6 +40,8 @@ def in_threads(
     workers = min(len(tasks), threads or cores())
     if workers < 2:
         return [work(task) for task in tasks]
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(work, tasks))
 
@@ -54,11 +59,13 @@ def ahead(items: Generator[Result, None, None], threads: int | None = None) -> I
         if (threads or cores()) < 2:
             yield items
             return
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor(1) as maker:
             yield _made_ahead(items, maker)
 
 
-def _made_ahead(items: Iterator[Result], maker: ThreadPoolExecutor) -> Iterator[Result]:
+def _made_ahead(items: Iterator[Result], maker: "ThreadPoolExecutor") -> Iterator[Result]:
     coming = maker.submit(next, items, _END)
     while (item := coming.result()) is not _END:
         coming = maker.submit(next, items, _END)

@@ -29,7 +29,7 @@ _Plain = StrictBool | StrictInt | FiniteFloat | StrictStr
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class _IssueRecord(_Part):
@@ -105,7 +105,7 @@ class _ClearanceRecord(_Part):
 
 
 class _Inputs(BaseModel):
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config = ConfigDict(extra="allow", frozen=True, defer_build=True)
     __pydantic_extra__: dict[str, _Plain | list[_Plain]]
 
     program: StrictStr = ""
@@ -115,7 +115,7 @@ class _Inputs(BaseModel):
 class PredictionRecord(BaseModel):
     """The head of a prediction; `cell` is checked when it is made into a `Cell`."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, defer_build=True)
 
     inputs: _Inputs
     issues: tuple[_IssueRecord, ...]
@@ -124,7 +124,7 @@ class PredictionRecord(BaseModel):
     cell: dict[str, Any]
     restart: _RestartRecord | None = None
     simplified: _SimplifiedRecord | None = None
-    clearance: _ClearanceRecord = _ClearanceRecord()
+    clearance: _ClearanceRecord = _ClearanceRecord.model_construct()
     correction_mm: _NotNegative = 0.0
     forces_relative_band: _Band = 0.0
     deflection_relative_band: _Band = 0.0

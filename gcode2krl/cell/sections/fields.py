@@ -39,7 +39,7 @@ def missing_key(key: str, reason: str = "") -> Issue:
 class Section(BaseModel):
     """A table of the cell file: unknown keys are errors, values do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class Provenance(Section):

@@ -128,8 +128,8 @@ class Online(Section):
     """None: from the robot's delay, see `pilot_lead_s`."""
     robot_delay_s: NotNegative | None = None
     """From a correction sent to the robot's movement, as measured on this robot."""
-    gains: Gains = Gains()
-    axis_gains: Annotated[tuple[Gains, ...], Field(min_length=6, max_length=6)] = (Gains(),) * 6
+    gains: Gains = Gains.model_construct()
+    axis_gains: Annotated[tuple[Gains, ...], Field(min_length=6, max_length=6)] = (Gains.model_construct(),) * 6
     most_mm: Annotated[float, Field(strict=True, gt=0, le=10)] = 2.5
     """Largest correction, of the sum; also ``POSCORR`` and ``POSCORRMON``. 1.4 mm is the paper's largest
     deviation."""
@@ -148,8 +148,8 @@ class Online(Section):
     calibration: str | None = None
     """File of `identify sensor`, relative to the cell file; None: the sensor's values are used as the process
     force."""
-    probe: Probe = Probe()
-    link: RobotLink = RobotLink()
+    probe: Probe = Probe.model_construct()
+    link: RobotLink = RobotLink.model_construct()
 
     @field_validator("cycle_s")
     @classmethod

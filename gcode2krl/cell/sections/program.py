@@ -63,8 +63,8 @@ class Program(Section):
     tool_length: Literal["g43", "from_table"] = "g43"
     """Who applies the length of a tool: ``g43`` in the G-code, or ``from_table`` of the cell while it is in
     the spindle, for posts that set lengths by touching off and never write G43."""
-    start: Start = Start()
-    cutter: Cutter = Cutter()
+    start: Start = Start.model_construct()
+    cutter: Cutter = Cutter.model_construct()
     warn_size_mb: Positive = 4.0
     externals: tuple[Annotated[str, Field(pattern=_EXTERNAL)], ...] = ()
     """Subprograms that templates call, as in KRL: ``SPINDLE_ON(INT :IN)``."""

@@ -102,12 +102,12 @@ class Robot(Section):
     """The robot's name in ``$TRAFONAME[]`` of the controller; empty: the guard does not check it."""
     trafo_source: str = ""
     trafo_sure: Sure = "memory"
-    geometry: Geometry = Geometry()
-    limits: Limits = Limits()
-    speeds: Speeds = Speeds()
-    payload: Payload = Payload()
-    drives: Drives = Drives()
-    body: RobotBody = RobotBody()
+    geometry: Geometry = Geometry.model_construct()
+    limits: Limits = Limits.model_construct()
+    speeds: Speeds = Speeds.model_construct()
+    payload: Payload = Payload.model_construct()
+    drives: Drives = Drives.model_construct()
+    body: RobotBody = RobotBody.model_construct()
     note: str = ""
 
     def is_named(self, shown: str) -> bool:
