@@ -2,8 +2,11 @@
 
 The yardstick is LinuxCNC's stand-alone interpreter, ``rs274 -g``, which reads the same file in the same run.
 Every figure is a whole process, start-up included, unless the table says otherwise. The row that a user
-meets is ``translate, as typed``: the command of the README with the built-in cell. Nothing is judged here:
-the figures are printed.
+meets is ``translate, as typed``: the command of the README with the built-in cell. It is typed for two rasters: that
+of the README with a ball of 8 mm, and one of a flat mill of 16 mm on a part of 140 x 74 mm. Processor time stands
+beside the wall's, which rewards overlap too; it is the measure on a machine that does something else as well. Last
+comes what the removal does: cells looked at for each that is lowered (counted by the checked build), and how fast.
+Nothing is judged here: the figures are printed.
 
     python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
     python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
@@ -32,19 +35,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from throughput_kinds import Kind, write_kinds
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "examples"))
 
-import gcode2krl
+from make_raster import Raster, raster_program  # noqa: E402
+from throughput_kinds import Kind, write_kinds  # noqa: E402
+
+import gcode2krl  # noqa: E402
 
 # This process stays small (no numpy): Linux counts the parent's pages at the start of a child as its own.
 
-HERE = Path(__file__).resolve().parent
 PEERS = ("rs274", "gcodeparser", "pygcode", "toppra")
 YARDSTICK = "LinuxCNC rs274 -g, interprets only"
 AS_TYPED = "translate, as typed"
+AS_TYPED_FLAT = "translate, as typed, flat mill"
 PYGCODE_LINES = 20_000
 WARM_UP_LINES = 2_000
 CYCLE_S = 0.012
+CELL_LINES = 30_000
+"""Lines of the parts whose cells are counted: the build that counts is slow."""
 SMALLEST_SCALE = 10_000
 KIND_LINES = 200_000
 HAS_MOTION = "plan_motion" in gcode2krl.__all__
@@ -91,17 +100,24 @@ class Run(NamedTuple):
     """Time and memory of one process; ``problem`` is empty if it ended well."""
 
     seconds: float
+    processor_s: float
+    """User and system time, over all its threads."""
     peak_mb: float
     output: str
     problem: str
 
 
-def run(command: Sequence[str], folder: Path) -> Run:
-    """Run a process to its end, with its wall time and its own peak memory."""
+def run(command: Sequence[str], folder: Path, more: dict[str, str] | None = None) -> Run:
+    """Run a process to its end, with ``more`` in its environment: its times and its own peak memory."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         start = time.perf_counter()
         process = subprocess.Popen(
-            command, cwd=folder, env=environment(folder), stdout=out, stderr=err, stdin=subprocess.DEVNULL
+            command,
+            cwd=folder,
+            env=environment(folder) | (more or {}),
+            stdout=out,
+            stderr=err,
+            stdin=subprocess.DEVNULL,
         )
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
@@ -110,7 +126,8 @@ def run(command: Sequence[str], folder: Path) -> Run:
         err.seek(0)
         said = err.read().decode("utf-8", "replace").strip().splitlines()
         problem = f"exit code {process.returncode}: {said[-1] if said else ''}" if process.returncode else ""
-        return Run(seconds, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem)
+        processor_s = used.ru_utime + used.ru_stime
+        return Run(seconds, processor_s, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem)
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -143,6 +160,10 @@ class Work:
     def seconds(self) -> list[float]:
         return [self.seconds_of(once) for once in self.runs]
 
+    def processor_s(self) -> float:
+        """Return the least processor time, scaled as the wall's is."""
+        return min(once.processor_s * self.seconds_of(once) / once.seconds for once in self.runs)
+
 
 # --- files -----------------------------------------------------------------------------------------
 
@@ -153,6 +174,17 @@ def make_raster(folder: Path, lines: int) -> Path:
     options = ["--out", str(folder), "--raster-lines", str(lines)]
     subprocess.run([sys.executable, str(script), *options], check=True, stdout=subprocess.DEVNULL)
     return folder / f"raster_{lines}.nc"
+
+
+def make_flat_raster(folder: Path, lines: int) -> Path:
+    """Write a raster of about so many lines for a flat mill and return its file."""
+    rows = max(1, round(lines / 251))  # 250 steps and the link to the next row
+    raster = Raster(rows, row_mm=150.0, stepover_mm=0.75, x_mm=-75.0, y_mm=-37.5, rows_per_layer=100)
+    part = folder / f"flat_raster_{lines}.nc"
+    with part.open("w", encoding="ascii", newline="\n") as file:
+        for line in raster_program(raster):
+            file.write(line.replace("T13 BALL NOSE D8", "T1 FLAT D16").replace("T13 ", "T1 ").replace("H13", "H1") + "\n")
+    return part
 
 
 def rewrite(part: Path, name: str, change: Callable[[str], str], most: int | None = None) -> Path:
@@ -287,11 +319,16 @@ def translate(part: Path, out: str) -> list[str]:
     return [sys.executable, "-m", "gcode2krl", str(part), "-o", out, "-q"]
 
 
-def our_work(part: Path) -> list[Work]:
+def our_work(part: Path, lines: int) -> list[Work]:
     """Return reading, translating and, where it exists, the chain with the time law."""
     out = str(part.with_name("out.src"))
     read = [sys.executable, "-c", READ.format(part=str(part))]
-    work = [Work("read into a Toolpath", read, 0.2), Work(AS_TYPED, translate(part, out), 2.5)]
+    flat = make_flat_raster(part.parent, lines)
+    work = [
+        Work("read into a Toolpath", read, 0.2),
+        Work(AS_TYPED, translate(part, out), 2.5),
+        Work(AS_TYPED_FLAT, translate(flat, str(part.with_name("flat.src"))), 2.5),
+    ]
     turned = with_rotary_words(part)
     work.append(
         Work(
@@ -309,7 +346,7 @@ def our_work(part: Path) -> list[Work]:
 
 def warm_up(folder: Path) -> None:
     """Bring what is imported into the machine's memory: everything once on a short raster."""
-    for work in our_work(make_raster(folder, WARM_UP_LINES)):
+    for work in our_work(make_raster(folder, WARM_UP_LINES), WARM_UP_LINES):
         work.repeat(folder)
 
 
@@ -357,13 +394,87 @@ def print_stages(part: Path, lines: int, folder: Path) -> None:
         print(f"  {name:<14}{seconds:8.2f}{lines / seconds:14,.0f}{f'{rows:,}' if rows else '':>13}")
 
 
+# --- removal, cell by cell (a child process runs this) ---------------------------------------------
+
+
+class Cells(NamedTuple):
+    """What the removal of a part does."""
+
+    looked_at: int
+    lowered: int
+    """Both 0 where nothing counts."""
+    samples: int
+    seconds: float
+    """Processor time of removal and reading, the commands' other stages left out."""
+    lowest_per_s: float
+    """Cells a second that ``np.minimum`` takes on the same field."""
+
+
+def cells_of(part: str) -> Cells:
+    """Cut a part with the built-in cell in this process and return what its removal does."""
+    import numpy as np
+
+    from gcode2krl.cutting import engagement, height_field, milling
+
+    grids, seconds, samples = [], [], []
+    new_grid, cut_strip = height_field.HeightField.grid, engagement.cut_strip
+
+    def kept_grid(*given):
+        grids.append(new_grid(*given))
+        return grids[-1]
+
+    def timed_strip(*given):
+        start = time.process_time()
+        cut_strip(*given)
+        seconds.append(time.process_time() - start)
+
+    height_field.HeightField.grid, engagement.cut_strip = kept_grid, timed_strip
+    cell = gcode2krl.load_cell()
+    toolpath = gcode2krl.read_gcode(part, cell)
+    motion = gcode2krl.plan_motion(gcode2krl.set_targets(toolpath, cell), cell)
+    removal = milling.remove(toolpath, motion, cell)
+    samples.append(len(motion))
+    height = np.ascontiguousarray(removal.part.height_mm)
+    lower, best_s = height - 1.0, math.inf
+    for _ in range(5):
+        start = time.process_time()
+        np.minimum(height, lower, out=lower)
+        best_s = min(best_s, time.process_time() - start)
+    looked_at, lowered = (int(sum(grid.counted[k] for grid in grids)) for k in (0, 1))
+    return Cells(looked_at, lowered, sum(samples), sum(seconds), height.size / max(best_s, 1e-6))
+
+
+def print_cells(part: Path, lines: int, name: str, folder: Path) -> None:
+    """Print what the removal of a part does: counted by the checked build, timed with the usual one."""
+    command = [sys.executable, str(Path(__file__).resolve()), "--cells-of", str(part)]
+    usual = run(command, folder)
+    counting = run(command, folder, {"GCODE2KRL_CORE": "checked"})
+    if usual.problem:
+        print(f"  {name:<8}{usual.problem}")
+        return
+    timed = Cells(*json.loads(usual.output))
+    us_a_sample = timed.seconds / timed.samples * 1e6
+    line = f"  {name:<8}{timed.seconds / lines * 1e6:12.2f}{us_a_sample:14.2f}"
+    if counting.problem:
+        print(f"{line}  not counted: `python native/build.py --checked` makes the build that counts")
+        return
+    counted = Cells(*json.loads(counting.output))
+    per_s = counted.lowered / timed.seconds
+    looked_at = counted.looked_at / max(counted.lowered, 1)
+    print(f"{line}{looked_at:12.2f}{per_s / 1e6:14.1f}{per_s / timed.lowest_per_s:14.2%}")
+
+
 # --- tables ----------------------------------------------------------------------------------------
 
 
 def print_table(table: Sequence[Work]) -> None:
     measure = next((w for w in table if w.name == YARDSTICK and not w.problem), None)
     unit_s = min(measure.seconds()) if measure else None
-    print(f"  {'':<40}{'best s':>9}{'median s':>10}{'x rs274':>9}{'to reach':>10}{'peak MB':>9}")
+    unit_processor_s = measure.processor_s() if measure else None
+    print(
+        f"  {'':<40}{'best s':>9}{'median s':>10}{'x rs274':>9}{'to reach':>10}{'processor s':>13}{'x rs274':>9}"
+        f"{'peak MB':>9}"
+    )
     for work in table:
         if work.problem:
             print(f"  {work.name:<40}  {work.problem}")
@@ -373,7 +484,12 @@ def print_table(table: Sequence[Work]) -> None:
         wanted = f"<= {work.to_reach:g}" if work.to_reach else ""
         peak_mb = max(once.peak_mb for once in work.runs)
         middle = statistics.median(work.seconds())
-        print(f"  {work.name:<40}{best:9.2f}{middle:10.2f}{ratio:>9}{wanted:>10}{peak_mb:9.0f}")
+        processor_s = work.processor_s()
+        share = f"{processor_s / unit_processor_s:.2f}" if unit_processor_s else "-"
+        print(
+            f"  {work.name:<40}{best:9.2f}{middle:10.2f}{ratio:>9}{wanted:>10}{processor_s:13.2f}{share:>9}"
+            f"{peak_mb:9.0f}"
+        )
 
 
 def compare(arguments: argparse.Namespace, folder: Path) -> None:
@@ -386,7 +502,7 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
         table.insert(0, measure)
     else:
         words.append(measure)
-    table += our_work(part)
+    table += our_work(part, arguments.lines)
     for _ in range(arguments.repeats):
         for work in table:
             work.repeat(folder)
@@ -402,6 +518,11 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
     for word in words:
         print(f"  {word}")
     print_stages(part, lines, folder)
+    few = min(arguments.lines, CELL_LINES)
+    print(f"\nremoval and reading, {few:,} lines: us of processor time a line, a sample; cells looked at for each lowered;")
+    print("cells lowered a second, in millions, and as a share of np.minimum on the same field")
+    for name, make in (("ball", make_raster), ("flat", make_flat_raster)):
+        print_cells(make(folder, few), few, name, folder)
 
 
 def kind_work(kind: Kind, arguments: argparse.Namespace, folder: Path) -> tuple[list[Work], list[str]]:
@@ -439,7 +560,7 @@ def print_scaling(largest: int, repeats: int, folder: Path) -> None:
     while size <= largest:
         part = make_raster(folder, size)
         lines = count_lines(part)
-        for work in our_work(part)[:2]:
+        for work in our_work(part, size)[:3]:
             for _ in range(repeats):
                 work.repeat(folder)
             if work.problem:
@@ -502,6 +623,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")
     parser.add_argument("--kinds", action="store_true", help="also arcs, a macro program, five axes")
     parser.add_argument("--stages-of", help=argparse.SUPPRESS)
+    parser.add_argument("--cells-of", help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
@@ -509,6 +631,9 @@ def main() -> None:
     arguments = options()
     if arguments.stages_of:
         run_stages(arguments.stages_of, Path.cwd())
+        return
+    if arguments.cells_of:
+        print(json.dumps(cells_of(arguments.cells_of)))
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -2,7 +2,7 @@
 
 The core is C99 without allocation, without global state and without fast-math: the same input gives the same
 bits on every processor. Arrays come from Python as views; `AT` and `CELL` read and write them, and a build
-with CHECKED stops the process at the first index outside its array, with the file and the line.
+with CHECKED stops the process at the first index outside its array, with the file and the line, and counts.
 A constant of the Python modules stands in constants.h under the name of its module and its own. */
 
 #ifndef CORE_H
@@ -34,8 +34,10 @@ VIEW(Bools, uint8_t);
 #ifdef CHECKED
 int64_t core_inside(int64_t index, int64_t count, const char *file, int line);
 #define INSIDE(index, count) core_inside((index), (count), __FILE__, __LINE__)
+#define COUNT(number, more) ((number) += (more))
 #else
 #define INSIDE(index, count) (index)
+#define COUNT(number, more) ((void)0)
 #endif
 
 /* The i-th number of a view, its rows one behind the other; the number in row i and column j. */

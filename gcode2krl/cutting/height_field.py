@@ -66,6 +66,7 @@ class HeightField:
             wall=np.full(height.shape, -1, np.int32),
             bound=np.empty(blocks, np.float32),
             visits=np.zeros(blocks, np.int32),
+            counted=np.zeros(2, np.int64),
             x_mm=float(self.origin_mm[0]),
             y_mm=float(self.origin_mm[1]),
             dx_mm=float(self.cell_mm[0]),

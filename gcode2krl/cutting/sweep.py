@@ -29,6 +29,8 @@ class Grid(NamedTuple):
     bound: NDArray[np.float32]
     """(ceil(ny/BLOCK), ceil(nx/BLOCK)) no height in the block is above it."""
     visits: Ints32
+    counted: Ints
+    """(2,) cells that sweeps have looked at and that they have lowered; only the checked build counts."""
     x_mm: float
     y_mm: float
     """Low corner of the whole field, x and y."""
@@ -74,6 +76,6 @@ class Samples(NamedTuple):
     """(n,) True where the engagement is read in any case."""
 
 
-GRID = StructOf.record(Grid, written=("height", "wall", "bound", "visits"))
+GRID = StructOf.record(Grid, written=("height", "wall", "bound", "visits", "counted"))
 PATH = StructOf.record(Path)
 SAMPLES = StructOf.record(Samples)

@@ -112,9 +112,11 @@ static void lower_block(const Grid *grid, const Lines *lines, const Sweep32 *swe
         for (int64_t lane = 0; lane < count; lane++) {
             const int64_t cell = block->first[lane] + step + lines->shift_p;
             const int64_t at = (begin + lane) * lines->step_q + cell * lines->step_p;
+            COUNT(AT(grid->counted, LOOKED_AT), block->first[lane] + step < block->after[lane]);
             if (lows[lane] < INFINITY && lows[lane] < AT(height, at)) {
                 AT(height, at) = lows[lane];
                 AT(wall, at) = -1;
+                COUNT(AT(grid->counted, LOWERED), 1);
             }
         }
     }

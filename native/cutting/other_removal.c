@@ -190,6 +190,7 @@ static inline void lower_cells(const Grid *grid, const Plan *plan, const Sweep32
         float *height = &CELL(grid->height, i, j);
         int32_t *wall = &CELL(grid->wall, i, j);
         (void)INSIDE(j + LANES - 1, grid->height.columns);
+        COUNT(AT(grid->counted, LOOKED_AT), least(after - column, LANES));
         if (!any_above_all(height, sweep->lowest))
             continue;
         if (bound) {
@@ -201,6 +202,7 @@ static inline void lower_cells(const Grid *grid, const Plan *plan, const Sweep32
         const int32_t left = after - column;
         for (int32_t lane = 0; lane < LANES; lane++) {
             const float low = lane < left ? lows[lane] : INFINITY;
+            COUNT(AT(grid->counted, LOWERED), low < height[lane]);
             wall[lane] = low < height[lane] ? -1 : wall[lane];
             height[lane] = low < height[lane] ? low : height[lane];
         }

@@ -8,6 +8,9 @@
 /* Room for rounding in a bound of the height below a sweep: ten times that of coordinates of a metre. */
 #define ROUNDING_MM 1e-3f
 
+/* What Grid.counted holds. */
+enum { LOOKED_AT, LOWERED };
+
 /* A sweep from (ax, ay, az): its direction and length in plan, its slope in plan and along the path. */
 typedef struct {
     const Outline *outline;
