@@ -12,6 +12,7 @@ in front of a convex cutter was inside it before. */
 #include "cutting/walls.h"
 
 #define STRAIGHT 0.03 /* sine of the angle in plan below which a path counts as straight */
+#define SMALL 0.15     /* share of the whole force below which a part of it need not be known to a share of itself */
 #define LEVEL 0.15    /* the same up or down, where it only moves the angle at which the chip begins */
 /* By how much a node may differ from what lies between two others, at the ends of arcs and as a share of the force; by
    how much the force may change between those. */
@@ -150,9 +151,13 @@ void write_row(const Reader *reader, const Sample *sample, int64_t i, const Node
     AT(result->torque_Nmm, i) = per_turn * load.torque;
 }
 
-/* Return the square of the force by which two loads differ. */
-static double squares_apart(const Load *a, const Load *b) {
-    return squared(a->feed - b->feed) + squared(a->normal - b->normal) + squared(a->axial - b->axial);
+/* Tell whether two loads differ by no more than a share of a third one: the force across the axis by none of that, unless it
+   is small beside the force along it. */
+static bool are_near(const Load *a, const Load *b, const Load *size, double share) {
+    const double across = squared(size->feed) + squared(size->normal), whole = across + squared(size->axial);
+    const double apart = squared(a->feed - b->feed) + squared(a->normal - b->normal), most = squared(share);
+    return apart <= most * greater(across, squared(SMALL) * whole) &&
+           apart + squared(a->axial - b->axial) <= most * whole;
 }
 
 /* Return where the contact of a node begins or ends. */
@@ -178,7 +183,5 @@ bool lies_between(const Reader *reader, int64_t i, const Node *node, const Node 
     const double scale = feed_scale(law, greater(AT(samples->f_z_mm, i), 0.0));
     const Load at_a = load_between(a, a, 0.0, scale), at_b = load_between(b, b, 0.0, scale);
     const Load mean = load_between(a, b, share, scale), here = load_between(node, node, 0.0, scale);
-    const double size = squared(here.feed) + squared(here.normal) + squared(here.axial);
-    return squares_apart(&mean, &here) <= squared(most->share) * size &&
-           squares_apart(&at_a, &at_b) <= squared(most->change) * size;
+    return are_near(&mean, &here, &here, most->share) && are_near(&at_a, &at_b, &here, most->change);
 }
