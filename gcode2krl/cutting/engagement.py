@@ -259,7 +259,7 @@ def _tangents(position_mm: Floats, first: Bools) -> Floats:
 
 def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float]:
     """Return the borders of strips with equally many samples each, none narrower than useful."""
-    strips = min(threads or cores(), max(1, int(np.ptp(along_mm) / (2.0 * halo_mm))))
+    strips = min(threads or cores(), max(1, int(np.ptp(along_mm) / halo_mm)))
     if threads is None and len(along_mm) < _FEW_SAMPLES:
         strips = 1
     inner = np.quantile(along_mm, np.linspace(0.0, 1.0, strips + 1)[1:-1])
