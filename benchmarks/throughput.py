@@ -2,11 +2,11 @@
 
 The yardstick is LinuxCNC's stand-alone interpreter, ``rs274 -g``, which reads the same file in the same run.
 Every figure is a whole process, start-up included, unless the table says otherwise. The row that a user
-meets is ``translate, as typed``: the command of the README with the built-in cell. It is typed for two rasters: that
-of the README with a ball of 8 mm, and one of a flat mill of 16 mm on a part of 140 x 74 mm. Processor time stands
-beside the wall's, which rewards overlap too; it is the measure on a machine that does something else as well. Last
-comes what the removal does: cells looked at for each that is lowered (counted by the checked build), and how fast.
-Nothing is judged here: the figures are printed.
+meets is ``translate, as typed``: the command of the README with the built-in cell. It is typed for two
+rasters: that of the README with a ball of 8 mm, and one of a flat mill of 16 mm on a part of 140 x 74 mm.
+Processor time stands beside the wall's, which rewards overlap too; it is the measure on a machine that does
+something else as well. Last comes what the removal does: cells looked at for each that is lowered (counted
+by the checked build), and how fast. Nothing is judged here: the figures are printed.
 
     python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
     python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
@@ -127,7 +127,9 @@ def run(command: Sequence[str], folder: Path, more: dict[str, str] | None = None
         said = err.read().decode("utf-8", "replace").strip().splitlines()
         problem = f"exit code {process.returncode}: {said[-1] if said else ''}" if process.returncode else ""
         processor_s = used.ru_utime + used.ru_stime
-        return Run(seconds, processor_s, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem)
+        return Run(
+            seconds, processor_s, used.ru_maxrss / 1024, out.read().decode("utf-8", "replace"), problem
+        )
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -183,7 +185,8 @@ def make_flat_raster(folder: Path, lines: int) -> Path:
     part = folder / f"flat_raster_{lines}.nc"
     with part.open("w", encoding="ascii", newline="\n") as file:
         for line in raster_program(raster):
-            file.write(line.replace("T13 BALL NOSE D8", "T1 FLAT D16").replace("T13 ", "T1 ").replace("H13", "H1") + "\n")
+            flat = line.replace("T13 BALL NOSE D8", "T1 FLAT D16").replace("T13 ", "T1 ").replace("H13", "H1")
+            file.write(f"{flat}\n")
     return part
 
 
@@ -444,17 +447,17 @@ def cells_of(part: str) -> Cells:
     return Cells(looked_at, lowered, sum(samples), sum(seconds), height.size / max(best_s, 1e-6))
 
 
-def print_cells(part: Path, lines: int, name: str, folder: Path) -> None:
+def print_cells(part: Path, name: str, folder: Path) -> None:
     """Print what the removal of a part does: counted by the checked build, timed with the usual one."""
     command = [sys.executable, str(Path(__file__).resolve()), "--cells-of", str(part)]
-    usual = run(command, folder)
+    usual, whole = run(command, folder), run(translate(part, str(folder / "cells.src")), folder)
     counting = run(command, folder, {"GCODE2KRL_CORE": "checked"})
-    if usual.problem:
-        print(f"  {name:<8}{usual.problem}")
+    if problem := usual.problem or whole.problem:
+        print(f"  {name:<8}{problem}")
         return
     timed = Cells(*json.loads(usual.output))
-    us_a_sample = timed.seconds / timed.samples * 1e6
-    line = f"  {name:<8}{timed.seconds / lines * 1e6:12.2f}{us_a_sample:14.2f}"
+    whole_ns, own_ns = (seconds / timed.samples * 1e9 for seconds in (whole.processor_s, timed.seconds))
+    line = f"  {name:<8}{whole_ns:16.0f}{own_ns:14.0f}"
     if counting.problem:
         print(f"{line}  not counted: `python native/build.py --checked` makes the build that counts")
         return
@@ -472,8 +475,8 @@ def print_table(table: Sequence[Work]) -> None:
     unit_s = min(measure.seconds()) if measure else None
     unit_processor_s = measure.processor_s() if measure else None
     print(
-        f"  {'':<40}{'best s':>9}{'median s':>10}{'x rs274':>9}{'to reach':>10}{'processor s':>13}{'x rs274':>9}"
-        f"{'peak MB':>9}"
+        f"  {'':<40}{'best s':>9}{'median s':>10}{'x rs274':>9}{'to reach':>10}"
+        f"{'processor s':>13}{'x rs274':>9}{'peak MB':>9}"
     )
     for work in table:
         if work.problem:
@@ -519,10 +522,11 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
         print(f"  {word}")
     print_stages(part, lines, folder)
     few = min(arguments.lines, CELL_LINES)
-    print(f"\nremoval and reading, {few:,} lines: us of processor time a line, a sample; cells looked at for each lowered;")
-    print("cells lowered a second, in millions, and as a share of np.minimum on the same field")
+    print(f"\n{few:,} lines: ns of processor time a sample, all of the command and its cutting alone;")
+    print("cells looked at for each lowered; cells lowered a second, and as a share of np.minimum's")
+    print(f"  {'':<8}{'command, ns':>16}{'cutting, ns':>14}{'looked at':>12}{'millions/s':>14}{'share':>14}")
     for name, make in (("ball", make_raster), ("flat", make_flat_raster)):
-        print_cells(make(folder, few), few, name, folder)
+        print_cells(make(folder, few), name, folder)
 
 
 def kind_work(kind: Kind, arguments: argparse.Namespace, folder: Path) -> tuple[list[Work], list[str]]:

@@ -129,7 +129,9 @@ class Online(Section):
     robot_delay_s: NotNegative | None = None
     """From a correction sent to the robot's movement, as measured on this robot."""
     gains: Gains = Gains.model_construct()
-    axis_gains: Annotated[tuple[Gains, ...], Field(min_length=6, max_length=6)] = (Gains.model_construct(),) * 6
+    axis_gains: Annotated[tuple[Gains, ...], Field(min_length=6, max_length=6)] = (
+        Gains.model_construct(),
+    ) * 6
     most_mm: Annotated[float, Field(strict=True, gt=0, le=10)] = 2.5
     """Largest correction, of the sum; also ``POSCORR`` and ``POSCORRMON``. 1.4 mm is the paper's largest
     deviation."""
