@@ -66,11 +66,14 @@ def sections_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 def described_schema(cell: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON schema of a cell, each key with its description, unit and example."""
+    sections = _all_sections(cell)
+    for section in sections:  # a default value can be written once its section's schema is built
+        section.model_rebuild()
     schema = cell.model_json_schema()
     schema["properties"] = {
         key: value for key, value in schema["properties"].items() if key not in NOT_OF_A_FILE
     }
-    for section in _all_sections(cell):
+    for section in sections:
         node = schema if section is cell else schema["$defs"].get(section.__name__)
         for key, description in descriptions_of(section).items() if node else ():
             node["properties"][key]["description"] = description.sentence()
