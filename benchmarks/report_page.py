@@ -99,7 +99,8 @@ def main() -> None:
         file = place / f"raster_{asked.lines}.html"
         start = time.perf_counter()
         history = part_of(prediction)
-        print(f"part cut in {time.perf_counter() - start:.2f} s, {len(history.cell)} events")
+        events = 0 if history is None else len(history.cell)
+        print(f"part cut in {time.perf_counter() - start:.2f} s, {events} events")
         start = time.perf_counter()
         content = content_of(prediction, text=part.read_text(encoding="ascii"), part=history)
         file.write_text(page(content), encoding="utf-8")
