@@ -4,8 +4,8 @@
 raster of so many lines (three samples a line), writes its page and opens it in a headless browser through
 playwright. Printed are the time to make the page, its size and what of it is data and libraries, the first
 paint, the time until everything can be used, frames per second while the view turns and while the robot
-moves along the path, and how long a jump to another second takes until it is drawn, with the part and with the
-path, with the renderer: without a graphics card the browser draws by software on the
+moves along the path, and how long a jump to another second takes until it is drawn, with the part and with
+the path, with the renderer: without a graphics card the browser draws by software on the
 machine's cores, so that only the same machine can be compared. Without playwright or browser the size alone
 is printed.
 """
@@ -72,7 +72,10 @@ JUMPING = """(jumps) => {
   return [took[jumps >> 1], took[jumps - 1]];
 }"""
 SHOWN = """([path, finished]) => {
-  const tick = (id, on) => { const box = document.getElementById(id); if (box && box.checked !== on) box.click(); };
+  const tick = (id, on) => {
+    const box = document.getElementById(id);
+    if (box && box.checked !== on) box.click();
+  };
   tick("show-path", path);
   tick("show-finished", finished);
 }"""
@@ -96,7 +99,8 @@ def main() -> None:
         file = place / f"raster_{asked.lines}.html"
         start = time.perf_counter()
         history = part_of(prediction)
-        print(f"part cut in {time.perf_counter() - start:.2f} s, {len(history.cell)} events")
+        events = 0 if history is None else len(history.cell)
+        print(f"part cut in {time.perf_counter() - start:.2f} s, {events} events")
         start = time.perf_counter()
         content = content_of(prediction, text=part.read_text(encoding="ascii"), part=history)
         file.write_text(page(content), encoding="utf-8")
