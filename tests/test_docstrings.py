@@ -49,7 +49,7 @@ def own_members(owner):
     """Yield name and object of what a class offers to the public and this package has written."""
     for kind in reversed(owner.__mro__):
         if kind.__module__.startswith("gcode2krl"):
-            for name, member in vars(kind).items():
+            for name, member in list(vars(kind).items()):
                 found = getattr(member, "fget", None) or getattr(member, "__func__", member)
                 if not name.startswith("_") and inspect.isfunction(found):
                     yield f"{owner.__name__}.{name}", found

@@ -54,6 +54,7 @@ def test_json_has_every_key_of_the_contract(run, part):
         "max_force_N",
         "max_deflection_mm",
         "corner_error_mm",
+        "quantities",
         "verify",
         "pilot",
         "issues",

@@ -138,9 +138,12 @@ def test_a_measured_force_bends_the_arm(swinging, known):
     np.testing.assert_array_equal(both.tcp_base_mm, signals.tcp_base_mm)
 
 
-def test_a_cell_without_stiffness_does_not_bend(swinging, known):
+def test_an_arm_of_unknown_stiffness_and_class_does_not_bend(swinging, known):
     compliance = swinging.cell.compliance.model_copy(update={"virtual_joints": {}})
-    rigid = replace(swinging, cell=swinging.cell.model_copy(update={"compliance": compliance}))
+    payload = swinging.cell.robot.payload.model_copy(update={"reach_mm": None})
+    robot = swinging.cell.robot.model_copy(update={"payload": payload})
+    unknown = {"compliance": compliance, "robot": robot}
+    rigid = replace(swinging, cell=swinging.cell.model_copy(update=unknown))
     np.testing.assert_array_equal(simulate(rigid).tcp_base_mm, swinging.position_mm)
     with pytest.raises(NotUnderstoodError):
         parse("stiffness:target=A1,scale=0.5", known, rigid.cell)
