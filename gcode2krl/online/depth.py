@@ -89,11 +89,13 @@ def _depth(twin: Twin, runs: "dict[Case, TwinRun]", where: Bools, whole: int) ->
 
     before = rms(runs["uncompensated"].error_mm)
     cases = [case for case in runs if case != "uncompensated"]
-    achieved = {}
+    achieved: dict[Case, float] = {}
     for case in cases:
         moved, meant = along(runs[case].shift_mm), along(_meant(twin, runs[case]))
         achieved[case] = float(moved @ meant / max(float(meant @ meant), 1e-12))
-    removed = {case: 100.0 * (1.0 - rms(runs[case].error_mm) / max(before, 1e-12)) for case in cases}
+    removed: dict[Case, float] = {
+        case: 100.0 * (1.0 - rms(runs[case].error_mm) / max(before, 1e-12)) for case in cases
+    }
     return Depth(float(np.count_nonzero(where) / whole), before, removed, achieved)
 
 
