@@ -88,7 +88,7 @@ def _depth(twin: Twin, runs: "dict[Case, TwinRun]", where: Bools, whole: int) ->
         return float(np.sqrt(np.mean(along(vector) ** 2)))
 
     before = rms(runs["uncompensated"].error_mm)
-    cases: list[Case] = [case for case in runs if case != "uncompensated"]
+    cases = [case for case in runs if case != "uncompensated"]
     achieved: dict[Case, float] = {}
     for case in cases:
         moved, meant = along(runs[case].shift_mm), along(_meant(twin, runs[case]))

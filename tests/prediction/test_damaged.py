@@ -162,7 +162,7 @@ def test_a_whole_table_with_wrong_values(folder, change):
         ("tool = 1,", "", "without tool"),
         ("rpm = 9000.0", "rpm = nan", "rpm"),
         ("forces_relative_band", "toolpath_events = 5\nx", "toml"),
-        ("forces_relative_band = 0.4", "forces_relative_band = inf", "forces_relative_band"),
+        ("forces_relative_band = 0.75", "forces_relative_band = inf", "forces_relative_band"),
         ("dt_s = 0.02", "dt_s = 0", "dt_s"),
         ("dt_s = 0.02", "dt_s = 'fast'", "dt_s"),
     ],
