@@ -27,6 +27,12 @@ def edges(cell, **factors):
     return with_material(cell, linear_edge=law.model_copy(update=change))
 
 
+def assert_same_cut(actual, wanted):
+    """Another law is read at other nodes, between which the force is interpolated (docs/cutting.md)."""
+    apart = np.sqrt(np.mean((actual - wanted) ** 2))
+    assert apart < 0.005 * np.sqrt(np.mean(np.asarray(wanted) ** 2))
+
+
 PARTS = {"tangential": ("Ktc", "Kte"), "radial": ("Krc", "Kre"), "axial": ("Kac", "Kae")}
 
 
@@ -35,8 +41,8 @@ def test_force_scale_is_the_cut_with_scaled_coefficients(part, milling, known, p
     signals = run(milling, known, f"force_scale:target={part_name},scale=1.35")
     scaled = edges(part.cell, **dict.fromkeys(PARTS[part_name], 1.35))
     wanted = cut(part.toolpath, part.motion, scaled)
-    np.testing.assert_allclose(signals.force_base_N, wanted.force_base_N, atol=1e-9)
-    np.testing.assert_allclose(signals.moment_base_Nmm, wanted.moment_base_Nmm, atol=1e-6)
+    assert_same_cut(signals.force_base_N, wanted.force_base_N)
+    assert_same_cut(signals.moment_base_Nmm, wanted.moment_base_Nmm)
     assert np.abs(signals.force_base_N - part.forces.force_base_N).max() > 0.5
     np.testing.assert_array_equal(signals.force_meas_base_N, signals.force_base_N)
 
@@ -47,11 +53,11 @@ def test_force_scale_under_kienzle(part, known):
     forces = cut(part.toolpath, part.motion, cell)
     inputs = inputs_of(replace(part, cell=cell, forces=forces))
     together = run(inputs, known, *(f"force_scale:target={name},scale=1.5" for name in PARTS))
-    np.testing.assert_allclose(together.force_base_N, 1.5 * forces.force_base_N, atol=1e-9)
+    assert_same_cut(together.force_base_N, 1.5 * forces.force_base_N)
     radial = run(inputs, known, "force_scale:target=radial,scale=1.5")
     more = law.model_copy(update={"radial_ratio": 0.6})
     wanted = cut(part.toolpath, part.motion, with_material(cell, kienzle=more))
-    np.testing.assert_allclose(radial.force_base_N, wanted.force_base_N, atol=1e-9)
+    assert_same_cut(radial.force_base_N, wanted.force_base_N)
     with pytest.raises(NotUnderstoodError, match="no linear edge coefficients"):
         parse("edge_force:scale=2", known, cell)
 
@@ -59,7 +65,7 @@ def test_force_scale_under_kienzle(part, known):
 def test_edge_force(part, milling, known):
     signals = run(milling, known, "edge_force:scale=2.5")
     wanted = cut(part.toolpath, part.motion, edges(part.cell, Kte=2.5, Kre=2.5, Kae=2.5))
-    np.testing.assert_allclose(signals.force_base_N, wanted.force_base_N, atol=1e-9)
+    assert_same_cut(signals.force_base_N, wanted.force_base_N)
 
 
 def test_the_tip_follows_the_true_force(milling, known):
