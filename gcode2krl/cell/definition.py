@@ -325,14 +325,14 @@ class Cell(Section):
         return codes | {key: text for key, text in others.items() if text}
 
     def __repr__(self) -> str:
-        return f"Cell({cell_words(self.name, self.robot.model, len(self.tool), self.is_confirmed)})"
+        return f"Cell({cell_words(self.name, self.robot.title, len(self.tool), self.is_confirmed)})"
 
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
         facts = {
-            "robot": self.robot.model,
+            "robot": self.robot.title,
             "controller": self.controller.model,
             "material": None if self.material is None else self.material.name,
             "stock": None if self.stock is None else "stated",

@@ -118,13 +118,13 @@ def _robot(cell: Cell) -> Iterator[Issue]:
             if high - low < _NARROW_DEG:
                 text = f": A{number} moves from {low:g} to {high:g} only"
                 yield _wrong("warning", "robot.limits.q_deg", text)
-    model, trafo = _ROBOT_NAME.search(robot.model), re.match(r"#?KR ?(\d+)", robot.trafo_name)
+    model, trafo = _ROBOT_NAME.search(robot.title), re.match(r"#?KR ?(\d+)", robot.trafo_name)
     if model and trafo and model[1] != trafo[1]:
-        text = f"= {robot.trafo_name!r}, and the robot is a {robot.model}: the guard would stop each program"
+        text = f"= {robot.trafo_name!r}, and the robot is a {robot.title}: the guard would stop each program"
         yield _wrong("warning", "robot.trafo_name", text)
     name = _ROBOT_NAME.search(cell.name)
     if name and model and name[1] != model[1]:
-        yield _wrong("warning", "robot.model", f"is {robot.model}, and the cell is called {cell.name!r}")
+        yield _wrong("warning", "robot.model", f"is {robot.title}, and the cell is called {cell.name!r}")
 
 
 def _external(cell: Cell) -> Iterator[Issue]:

@@ -51,7 +51,7 @@ def write_form(
         return console.record(dict.fromkeys(KEYS), files=[file])
     x, y, z = pulls.point_mm[0]
     size_N = float(np.linalg.norm(pulls.force_N[0]))
-    console.say(f"{file}: {len(pulls.q_rad)} pulls at {count} poses of the {cell.robot.model}")
+    console.say(f"{file}: {len(pulls.q_rad)} pulls at {count} poses of the {cell.robot.title}")
     if not is_watched:
         console.say("  NOT CHECKED for collisions: the cell describes no arm, tool or surroundings")
     console.say(f"  1. Bolt a stiff bar to the flange: force and dial at x {x:g}, y {y:g}, z {z:g} mm of it.")

@@ -48,7 +48,7 @@ def summary_lines(
     yield f"  blending   {np.count_nonzero(blended)} corners, CDIS {_span(targets.cdis_mm[blended], 3)} mm"
     yield f"  corners    off by at most {corner_mm:.4f} mm"
     yield f"  standstill {np.count_nonzero(lin & ~blended)} exact stops, {targets.wait_s.sum():.1f} s dwell"
-    yield f"  robot      {cell.robot.model}, status S = {joints.status[away][0]}"
+    yield f"  robot      {cell.robot.title}, status S = {joints.status[away][0]}"
     yield f"  joints     nearest limit {limit_deg:.1f} deg, |A5| at least {wrist_deg:.1f} deg"
     yield from (f"  external   {words}" for words in axes_words(targets, cell))
     yield f"  read back  {report.motions} motions, off by {read_back}, {speed_off:.2f} mm/min"

@@ -65,7 +65,7 @@ def missing_stiffness(cell: Cell) -> Issue | None:
         "error",
         "stiffness-unknown",
         0,
-        f"no deflection: the stiffness of {', '.join(missing)} of {cell.robot.model} is not known",
+        f"no deflection: the stiffness of {', '.join(missing)} of {cell.robot.title} is not known",
         "state mass_kg and reach_mm of [robot.payload], from which it is estimated, or measure it: "
         "`gcode2krl identify stiffness --pulls form.csv`",
     )

@@ -163,7 +163,7 @@ class ForceLimits:
             f", with the {own_kg:g} kg on the flange {self._whole_N:.0f} N" if self._cut_N < rated_N else ""
         )
         sentence = (
-            f"T{load.tool} is loaded with {self._cut_N:.0f} N{with_own}; the {self._cell.robot.model} is "
+            f"T{load.tool} is loaded with {self._cut_N:.0f} N{with_own}; the {self._cell.robot.title} is "
             f"rated for {rated_kg:g} kg ({rated_N:.0f} N)"
         )
         remedy = "check S, F and the depth of cut, [stock], [material] and [load] mass_kg of the cell"

@@ -137,7 +137,7 @@ def _cell_findings(cell: Cell) -> Iterator[Issue]:
             "error",
             "limits-unknown",
             0,
-            f"the joint limits of {cell.robot.model} are not known",
+            f"the joint limits of {cell.robot.title} are not known",
             "give [robot.limits] q_deg in the cell, from the data sheet",
         )
     home = limit_margin(cell.home_q_rad()[None, :], cell)[0]
@@ -154,7 +154,7 @@ def _cell_findings(cell: Cell) -> Iterator[Issue]:
             "warning",
             "joint-speeds-unknown",
             0,
-            f"joint speeds of {cell.robot.model} are not known; singularities are judged by |A5| alone",
+            f"joint speeds of {cell.robot.title} are not known; singularities are judged by |A5| alone",
             "give [robot.speeds] qd_deg_s in the cell",
         )
 

@@ -98,6 +98,8 @@ class Robot(Section):
     """One robot model; without geometry its joint angles are unknown."""
 
     model: OneLine = ""
+    name: OneLine | None = None
+    """Of an arm that is no model of the library."""
     trafo_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9 #_./+\-]*$", max_length=32)] = ""
     """The robot's name in ``$TRAFONAME[]`` of the controller; empty: the guard does not check it."""
     trafo_source: str = ""
@@ -109,6 +111,11 @@ class Robot(Section):
     drives: Drives = Drives.model_construct()
     body: RobotBody = RobotBody.model_construct()
     note: str = ""
+
+    @property
+    def title(self) -> str:
+        """What people call the arm; empty where the cell states none."""
+        return self.model or self.name or ("unnamed robot" if self.geometry.known else "")
 
     def is_named(self, shown: str) -> bool:
         """Tell whether ``$TRAFONAME[]`` that reads ``shown`` is of this robot, as a program's guard does.

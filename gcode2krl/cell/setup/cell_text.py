@@ -95,6 +95,7 @@ class _Writer:
             yield from _line(Robot, "trafo_source", f"archive {controller.source}, $TRAFONAME[]")
             yield from _line(Robot, "trafo_sure", "verified")
         if robot == OTHER:
+            yield from self._key(Robot, "name", self.answers.get("robot_name"), "robot_name")
             yield from _line(Robot, "note", "not in the library")
         lengths, speeds = self.answers.get("lengths_mm"), self.answers.get("speeds_deg_s")
         if lengths:

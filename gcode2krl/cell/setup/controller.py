@@ -287,6 +287,8 @@ class ArchivedController:
     """What an archive states; None or empty where it does not."""
 
     source: str
+    name: str = ""
+    """What the robot is called there."""
     trafo_name: str = ""
     model: str = ""
     """Robot of the library, where its name and its lengths agree."""
@@ -315,6 +317,7 @@ def read_controller(path: Path) -> ArchivedController:
         arm = read_arm(path)
         return ArchivedController(
             source=path.name,
+            name=arm.name,
             lengths_mm=arm.lengths_mm,
             limits_deg=arm.limits_deg,
             speeds_deg_s=arm.speeds_deg_s,
@@ -335,6 +338,7 @@ def controller_of(values: Mapping[str, Value], source: str) -> ArchivedControlle
     lengths = _lengths(values)
     return ArchivedController(
         source=source,
+        name=trafo_name,
         trafo_name=trafo_name,
         model=_model(_machine_name(values), trafo_name, lengths),
         lengths_mm=lengths,

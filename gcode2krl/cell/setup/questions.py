@@ -188,6 +188,15 @@ PLACE_QUESTIONS = (
         when=_is("robot", FILE),
     ),
     CellQuestion(
+        "robot_name",
+        "What is the robot called?",
+        "the plate on the arm",
+        "name",
+        "KR 120 R3900 K",
+        when=_is("robot", OTHER),
+        proposal=lambda controller, _: controller.name or None,
+    ),
+    CellQuestion(
         "lengths_mm",
         "a1 a2 c1 c2 c3 c4 in mm; a2 is negative where axis 4 lies above A3",
         "the dimensioned drawing on the data sheet",

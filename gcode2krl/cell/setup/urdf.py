@@ -68,7 +68,8 @@ def read_arm(file: Path) -> DescribedArm:
         text = file.read_bytes()
         if b"<!DOCTYPE" in text:
             raise _refused(file, "it declares a document type")
-        joints = list(_joints(ElementTree.fromstring(text)))
+        root = ElementTree.fromstring(text)
+        joints = list(_joints(root))
     except OSError as error:
         raise _refused(file, f"cannot read: {error.strerror}") from None
     except (
@@ -93,7 +94,7 @@ def read_arm(file: Path) -> DescribedArm:
         ]
         own = tuple((round(low, 3) + 0.0, round(high, 3) + 0.0) for low, high in degrees)
     known = [round(math.degrees(speed), 3) for speed in speeds if speed]
-    return DescribedArm(file.stem, lengths, own, tuple(known) if len(known) == 6 else None)
+    return DescribedArm(root.get("name") or file.stem, lengths, own, tuple(known) if len(known) == 6 else None)
 
 
 def _refused(file: Path, why: str) -> NotUnderstoodError:

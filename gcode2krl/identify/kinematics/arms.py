@@ -62,7 +62,7 @@ def _listed() -> dict[str, Arm]:
 def arm_of(cell: Cell) -> Arm:
     """Return the arm of a cell; raises `RefusedError` where its lengths are not stated."""
     a1, a2, c1, c2, c3, c4 = cell.robot.geometry.array()
-    return _kuka(cell.robot.model, np.array([a1, a2, 0.0, c1, c2, c3, c4, 0.0]))
+    return _kuka(cell.robot.title, np.array([a1, a2, 0.0, c1, c2, c3, c4, 0.0]))
 
 
 def _kuka(model: str, mm: Floats) -> Arm:

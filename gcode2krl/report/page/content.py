@@ -402,7 +402,7 @@ def _nearest(rows: Ints, row: int) -> int:
 def _facts(prediction: Prediction) -> list[tuple[str, str]]:
     """Return figures with their bands."""
     cell, toolpath = prediction.cell, prediction.toolpath
-    facts = [("robot", cell.robot.model or "not named"), ("G-code moves", f"{len(toolpath) - 1:,}")]
+    facts = [("robot", cell.robot.title or "not named"), ("G-code moves", f"{len(toolpath) - 1:,}")]
     if prediction.forces is not None:
         size = np.linalg.norm(prediction.forces.force_base_N, axis=1)
         band = f"± {prediction.forces.relative_band:.0%} (90 %)"

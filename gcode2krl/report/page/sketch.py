@@ -35,7 +35,7 @@ def robot_sketch(cell: Cell | None, tools: list[int]) -> dict[str, Any] | None:
     flange = _flange_at_zero(geometry)
     reach_mm = float(geometry[3] + geometry[4])
     return {
-        "model": cell.robot.model,
+        "model": cell.robot.title,
         "root": np.linalg.inv(cell.base_matrix()).T.reshape(-1).tolist(),
         "world": np.linalg.inv(cell.base_in_world()).T.reshape(-1).tolist(),
         "axes": [{"point": p.tolist(), "along": d.tolist()} for p, d in joint_axes(geometry)],
