@@ -1,6 +1,7 @@
 """``gcode2krl init``: cells from typed keys, from answers in a file and from a controller's archive."""
 
 import json
+import math
 import tomllib
 
 import pytest
@@ -364,25 +365,66 @@ length_mm = 100
 """
 
 
+PART = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\nG0 X0 Y0\nG1 Z-1 F600\nG1 X20\nG0 Z30\nM5\nM30\n"
+LONG_ARM = "KR 120 R3900 K"
+
+
 def answers_file(folder, text=DATA_SHEET):
     (folder / "answers.toml").write_text(text + MACHINE, "utf-8")
 
 
-def test_an_arm_by_its_data_sheet_writes_a_program(run, tmp_path):
-    """An arm of 120 kg and 3.9 m: no editor, two commands."""
-    answers_file(tmp_path)
-    done = run("init", "--answers", "answers.toml")
+def described(folder):
+    """The arm of the data sheet as a URDF: its zeros, axes and limits are KUKA's."""
+    lines = tomllib.loads(DATA_SHEET)
+    a1, a2, c1, c2, c3, c4 = (mm / 1000.0 for mm in lines["lengths_mm"])
+    links = ("base", "shoulder", "arm", "elbow", "forearm", "wrist", "hand", "flange")
+    places = [(0, 0, 0), (a1, 0, c1), (c2, 0, 0), (0, 0, -a2), (c3, 0, 0), (0, 0, 0), (c4, 0, 0)]
+    axes = ("0 0 -1", "0 1 0", "0 1 0", "-1 0 0", "0 1 0", "-1 0 0", "1 0 0")
+    joints = []
+    for k, (place, axis) in enumerate(zip(places, axes, strict=True)):
+        low, high = (math.radians(deg) for deg in (*lines["limits_deg"], 0, 0)[2 * k : 2 * k + 2])
+        joints.append(
+            f'<joint name="a{k + 1}" type="{"revolute" if k < 6 else "fixed"}"><axis xyz="{axis}"/>'
+            f'<origin xyz="{" ".join(map(str, place))}"/><parent link="{links[k]}"/>'
+            f'<child link="{links[k + 1]}"/><limit lower="{low}" upper="{high}" velocity="1.8"/></joint>'
+        )
+    (folder / "arm.urdf").write_text(f'<robot name="{LONG_ARM}">{"".join(joints)}</robot>', "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("of_file", "asked", "typed_in"),
+    [(["--controller", "arm.urdf"], 37, 22), ([], 37, 26)],
+    ids=["its URDF", "its data sheet"],
+)
+def test_an_arm_of_no_library_needs_two_commands(run, tmp_path, monkeypatch, of_file, asked, typed_in):
+    """A KR 120 R3900 K, whose reach and payload are public: from its file or its lengths to a program.
+
+    Counted are the questions that the dialogue asks, and those that Enter alone does not answer.
+    """
+    described(tmp_path)
+    answers_file(tmp_path, DATA_SHEET + f'robot_name = "{LONG_ARM}"\n')
+    controller = read_controller(tmp_path / "arm.urdf") if of_file else NOBODY
+    words = keys(read_answers(tmp_path / "answers.toml", controller), controller)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    with create_pipe_input() as pipe, create_app_session(input=pipe, output=DummyOutput()):
+        pipe.send_text("".join(words))
+        done = run("init", *of_file)
     assert done.code == 0, done.err
-    cell = load_cell(tmp_path / "cell.toml")
-    assert cell.robot.geometry.c3_mm == 1950.0
-    assert cell.robot.payload.reach_mm == 3901.0
-    (tmp_path / "part.nc").write_text(
-        "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\nG0 X0 Y0\nG1 Z-1 F600\nG1 X20\nG0 Z30\nM5\nM30\n",
-        "utf-8",
-    )
+    assert (len(words), sum(word != ENTER for word in words)) == (asked, typed_in)
+    robot = load_cell(tmp_path / "cell.toml").robot
+    assert (robot.title, robot.geometry.c3_mm, robot.payload.reach_mm) == (LONG_ARM, 1950.0, 3901.0)
+    (tmp_path / "part.nc").write_text(PART, "utf-8")
     done = run("part.nc", "--cell", "cell.toml", "-o", "part.src")
     assert done.code == 0, done.err
+    assert f"robot      {LONG_ARM}, status S" in done.out
     assert (tmp_path / "part.src").exists()
+
+
+def test_an_arm_that_nobody_names_is_called_so(run, tmp_path):
+    answers_file(tmp_path)
+    assert run("init", "--answers", "answers.toml").code == 0
+    assert load_cell(tmp_path / "cell.toml").robot.title == "unnamed robot"
 
 
 def test_lengths_that_do_not_give_the_reach_are_refused(run, tmp_path):
