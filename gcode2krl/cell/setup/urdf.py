@@ -94,7 +94,9 @@ def read_arm(file: Path) -> DescribedArm:
         ]
         own = tuple((round(low, 3) + 0.0, round(high, 3) + 0.0) for low, high in degrees)
     known = [round(math.degrees(speed), 3) for speed in speeds if speed]
-    return DescribedArm(root.get("name") or file.stem, lengths, own, tuple(known) if len(known) == 6 else None)
+    return DescribedArm(
+        root.get("name") or file.stem, lengths, own, tuple(known) if len(known) == 6 else None
+    )
 
 
 def _refused(file: Path, why: str) -> NotUnderstoodError:
