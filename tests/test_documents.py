@@ -59,7 +59,8 @@ SHOWN = [
 def predicted(tmp_path_factory):
     """A prediction of the test piece."""
     folder = tmp_path_factory.mktemp("predicted")
-    (folder / "cell.toml").write_text(CELL, encoding="ascii")
+    measured_material = f"{CELL}[material]\nrelative_band = 0.1\n"  # as `identify force` leaves it
+    (folder / "cell.toml").write_text(measured_material, encoding="ascii")
     made = predict(ROOT / "examples" / "test_piece.nc", load_cell(folder / "cell.toml"))
     made.save(folder / "prediction")
     return folder / "prediction"

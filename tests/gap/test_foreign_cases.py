@@ -62,8 +62,8 @@ def test_sound_runs_with_slow_noise_have_no_gap(seed, seconds, predictions, tmp_
     case = tmp_path / "case"
     make_case(seed, case, "none", predictions=predictions.as_posix())
     with_slow_noise(case, seconds, seed)
-    runs, plans = blind.loaded(case)
-    found = diagnose(plans[0], runs)
+    runs, prediction = blind.loaded(case)
+    found = diagnose(prediction, runs)
     assert found.verdict == "no_gap"
     assert found.causes == ()
 
@@ -73,8 +73,8 @@ def test_an_effect_beside_slow_noise_keeps_its_name(predictions, tmp_path):
     make_case(7101, case, "backlash", "same", predictions=predictions.as_posix())
     with_slow_noise(case, 0.3, 1)
     label = json.loads(case.with_name("case.label.json").read_text())
-    runs, plans = blind.loaded(case)
-    found = diagnose(plans[0], runs)
+    runs, prediction = blind.loaded(case)
+    found = diagnose(prediction, runs)
     assert found.causes[0].effect == "backlash"
     assert found.causes[0].target == label["effects"][0]["target"]
     assert found.causes[0].probability > 0.5

@@ -36,7 +36,7 @@ def test_a_figure_is_one_of_matplotlib(prediction, name):
 
 @pytest.mark.slow
 def test_the_command_draws_the_same(prediction, run, tmp_path):
-    done = run("predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet")
+    done = run("predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet", "--isolated")
     assert done.code == 0, done.err
     assert {file.stem for file in (tmp_path / "out").glob("*.png")} == set(FIGURES)
     with look():
@@ -47,7 +47,7 @@ def test_the_command_draws_the_same(prediction, run, tmp_path):
 @pytest.mark.parametrize(
     ("missing", "names"),
     [
-        ("forces", ("force", "force_path", "deflection_joints")),
+        ("forces", ("force", "force_path", "deflection_joints", "part")),
         ("deflection", ("deflection", "deflection_path", "deflection_joints")),
         ("joints", ("joints", "spin", "deflection_joints")),
         ("motion", FIGURES),
