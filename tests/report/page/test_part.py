@@ -115,6 +115,8 @@ def test_a_click_says_which_line_left_the_surface(window, prediction):
     window.evaluate("document.getElementById('look').scrollIntoView()")
     window.locator("#show-robot").uncheck()
     window.locator("[data-view=top]").click()
+    # the camera stands where it goes from the next frame on
+    window.evaluate("new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(then)))")
     place = """() => {
       const { scene } = report, box = scene.canvas.getBoundingClientRect();
       const at = scene.marker.position.clone().set(80, -50, -8.95).project(scene.camera);
