@@ -163,11 +163,11 @@ def worked(only: str, programs: int) -> dict[str, str]:
             _lay_out(programs, Path(scratch))
             for k, command in enumerate(job.commands):
                 code, printed = _called(command.split())
-                digests[f"{job.name} | {k} exit code {code}"] = _digest(printed.encode())
+                digests[f"{job.name} | {k} exit code {code}"] = _digest(printed.encode(), scratch)
             for file in sorted(path for path in Path("out").rglob("*") if path.is_file()):
                 if file.name in TIMED:
                     continue
-                digests[f"{job.name} | {file.as_posix()}"] = _digest(file.read_bytes())
+                digests[f"{job.name} | {file.as_posix()}"] = _digest(file.read_bytes(), scratch)
     return digests
 
 
@@ -184,7 +184,8 @@ def _lay_out(programs: int, folder: Path) -> None:
         )
 
 
-def _digest(data: bytes) -> str:
+def _digest(data: bytes, scratch: str) -> str:
+    data = data.replace(scratch.encode(), b".")  # a project file is named by its whole path
     return hashlib.sha256(data).hexdigest()[:DIGEST_CHARACTERS]
 
 
