@@ -62,7 +62,7 @@ def test_views_of_one_component_may_keep_different_nuisance():
     nothing = np.zeros((count * joints, 0))
     components = np.repeat(np.arange(joints), count)
     clock = c.split(rate[:, None], components)
-    plain = View(rate, nothing, clock, members, components)
+    plain = View(rate, nothing, clock, members, components, np.zeros(count * joints, dtype=int))
     alike = plain.beside(rate, 50.0 * rate[:, None])
     assert plain.at(2).kept == ()
     assert alike.at(2).kept == (0,)

@@ -27,6 +27,7 @@ def view(late, joints):
         nuisance=SplitColumns(np.zeros((rows, 0)), (), 0),
         members=csr_array(np.ones((1, rows))),
         components=np.repeat(np.arange(joints), COUNT),
+        runs=np.zeros(rows, dtype=int),
     )
 
 

@@ -8,7 +8,8 @@ level before and after it:
 - in step with the command, or at the same place in all repeats: structure, and it
   stays.
 - with a change that stays behind it: something slipped, which is told. It stays where it is
-  that change alone.
+  that change alone. Where another table is rough at the same moment it is a gap: instruments do not slip
+  together.
 - a pulse (`pulses`), or rough in two tables at once: an impulse of the machine. Its rows are a model of their
   own, so the rest is judged without them; it is told with moment, size and width, and is a gap.
 - else the instrument's: a burst. It is left out, and that is told.
@@ -320,7 +321,7 @@ def _sorted(
         change, has_changed = levels.change(stretch)
         whose = Whose.IMPULSE if stretch.is_pulse or in_both else Whose.INSTRUMENT
         whose = Whose.SLIP if has_changed else whose
-        event = levels.event(stretch, whose, change)
+        event = replace(levels.event(stretch, whose, change), is_shared=in_both)
         # a slip that is no more than its change is what a step's moment is fitted to
         out[rows] = whose is not Whose.SLIP or np.linalg.norm(event.peak) > np.linalg.norm(change)
         events.append(event)

@@ -46,6 +46,8 @@ class Event:
     """(k,) by how much the level is another one behind it."""
     power: float
     """Sum of the squares of its deviations over its rows."""
+    is_shared: bool = False
+    """Another table is rough at that moment, too."""
 
 
 class Signal:

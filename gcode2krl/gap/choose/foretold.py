@@ -171,9 +171,8 @@ def _at(evidence: Evidence, traces: Sequence[Trace], place: Place) -> Iterator[F
     hours = [float(trace.inputs.run_hours[0]) for trace in traces]
     for i, trace in enumerate(traces):
         if evidence.on is Dependence.RUN_TIME_STEP:
-            begun = (
-                trace.time_s >= value if i == number else np.full(len(trace.time_s), hours[i] > hours[number])
-            )
+            is_later = evidence.stays and hours[i] > hours[number]
+            begun = trace.time_s >= value if i == number else np.full(len(trace.time_s), is_later)
             yield begun[:, None].astype(np.float64)
             continue
         joint = place.joint or 0

@@ -119,6 +119,11 @@ class Judgement(Judged):
         """Return the events that are a gap by themselves: something hit or was hit."""
         return tuple(event for event in self.events if event.whose is Whose.IMPULSE)
 
+    @property
+    def slips(self) -> tuple[Event, ...]:
+        """Return the changes of the level that another table shows too: they are of the machine."""
+        return tuple(event for event in self.events if event.whose is Whose.SLIP and event.is_shared)
+
     def fitted(self, trace: Trace, stamps_s: Floats) -> Floats:
         """Return what the fitted model says of a trace's run at some stamps (n,), as (n, k).
 

@@ -83,7 +83,12 @@ def _key(applied: Applied) -> Key:
 
 
 def _with_impulses(judged: Judgement) -> Judgement:
-    """Return the judgement: an impulse of the machine is a gap whose rows no other test has."""
+    """Return the judgement: an impulse of the machine is a gap whose rows no other test has.
+
+    A change that two tables show is one, too, where nothing else tells of it.
+    """
+    if judged.slips and judged.verdict == "no_gap":
+        return replace(judged, verdict="unexplained")
     if judged.impulses and judged.verdict in ("no_gap", "explained"):
         verdict = "unexplained" if judged.verdict == "no_gap" else "partly_explained"
         return replace(judged, verdict=verdict, nearly_all=judged.verdict == "explained")

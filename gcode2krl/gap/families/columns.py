@@ -67,6 +67,12 @@ class Beside:
         )
         return scores
 
+    @property
+    def moved_scores(self) -> Floats:
+        """Return Pᵀ times the residuals that are moved in time (shifts, c)."""
+        scores: Floats = self.view.moved @ self.columns.values - self.view.moved_cross @ self.taken
+        return scores
+
     def explained(self, weights: Floats) -> Floats:
         """Return P times weights (c,), (v,)."""
         explained: Floats = self.columns.values @ weights - self.view.fixed @ (self.taken @ weights)

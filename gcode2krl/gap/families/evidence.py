@@ -1,7 +1,7 @@
 """The evidence of a family: how much better functions of an input explain what is left than nothing does."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -33,11 +33,15 @@ class Evidence:
     """By how much a gain varies more than white noise lets it."""
     flipped: Floats
     """(flips,) its log evidence where the signs of stretches are random, and ``unbounded`` with their own."""
+    moved: Floats
+    """(moves,) its log evidence where each run's residual is moved in time."""
     unbounded: float
     signal: tuple[Floats, ...]
     """(n, k) what it says of each trace; k = 1 where it is of one component alone."""
     at: tuple[int, float] | None = None
     """Run number and time of a step, or -1 and the frequency in Hz of a tone."""
+    stays: bool = True
+    """A step is in later runs, too."""
     in_one: float = 0.0
     """Of its gain, the share of one stretch of time at most: a sample at a sharp corner may have it all."""
 
@@ -45,10 +49,6 @@ class Evidence:
     def key(self) -> tuple[str, Dependence]:
         """Return where and on what."""
         return self.place.name, self.on
-
-    def flipped_as(self, flipped: Floats) -> "Evidence":
-        """Return the evidence with the null (flips,) of a search over positions."""
-        return replace(self, flipped=flipped)
 
 
 def evidence_of(
@@ -70,7 +70,8 @@ def evidence_of(
     beside = Beside(view, columns)
     gram, score, scores = beside.gram, beside.score, beside.scores
     best: tuple[float, int, Floats, Floats] | None = None
-    flips, owns = [], []
+    flips, owns, moves = [], [], []
+    moved_scores = beside.moved_scores
     for root in roots:
         values, vectors = np.linalg.eigh(root.T @ gram @ root)
         used = values > _RANK * max(float(values[-1]), 1e-30) if len(values) else values > 0
@@ -79,6 +80,7 @@ def evidence_of(
         turned = root @ vectors[:, used]
         own = log_evidence(values[used], turned.T @ score)
         flips.append(log_mean(log_evidence(values[used], signs @ (scores @ turned))))
+        moves.append(log_mean(log_evidence(values[used], moved_scores @ turned)))
         owns.append(log_mean(own))
         top = int(np.argmax(own))
         if best is None or own[top] > best[0]:
@@ -98,6 +100,7 @@ def evidence_of(
         gain=max(fit.gain, 0.0),
         inflation=gain_inflation(inverse, left, fitted=0),
         flipped=log_mean(np.array(flips).T) - cost,
+        moved=log_mean(np.array(moves).T) - cost,
         unbounded=float(log_mean(np.array(owns))) - cost,
         signal=tuple((own @ (turned @ fit.weights)).T for own in raw),
         at=at,

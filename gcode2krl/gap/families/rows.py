@@ -32,6 +32,9 @@ class Rows:
             np.concatenate([np.repeat(np.arange(k), n) for n, k in (trace.shape for trace in self.traces)])
         )
         """(v,) the component of each block."""
+        counts = [trace.shape[1] * len(at) for trace, at in zip(self.traces, self.starts, strict=True)]
+        self.runs: Ints = np.repeat(np.arange(len(counts)), counts)
+        """(v,) the number of each block's trace."""
         self.nuisance = self._nuisance()
         """(v, m) N."""
 

@@ -1,6 +1,7 @@
-"""Steps: from an unknown moment on, in the rest of that run and in all later ones."""
+"""Steps: from an unknown moment on, in the rest of that run and in all later ones, or gone in the next."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,8 +24,8 @@ _AT_ONCE = 40
 _FINER = 10
 """So many times closer are those around the best."""
 
-Moment = tuple[int, float]
-"""Number of a trace and the time in it."""
+Moment = tuple[int, float, bool]
+"""Number of a trace, the time in it, and whether later runs have the step, too: it may be mended."""
 
 
 class Steps:
@@ -44,32 +45,35 @@ class Steps:
 
     def coarse(self) -> list[Moment]:
         """Return the moments of the first search."""
-        return [(number, float(time)) for number in range(len(self.traces)) for time in self._times(number)]
+        return [
+            (number, float(time), stays)
+            for number in range(len(self.traces))
+            for stays in ((True,) if number == self.order[-1] else (True, False))
+            for time in self._times(number)
+        ]
 
     def finer(self, moment: Moment) -> list[Moment]:
         """Return the moments around one."""
-        number, time_s = moment
+        number, time_s, stays = moment
         trace, reach = self.traces[number], self.every_s[number]
         times = time_s + reach * np.arange(-_FINER + 1, _FINER) / _FINER
         low, high = trace.time_s[0] + _FROM_END_S, trace.time_s[-1] - _FROM_END_S
-        return [(number, float(t)) for t in times if low <= t <= high]
+        return [(number, float(t), stays) for t in times if low <= t <= high]
 
     def blocks(self, moments: Sequence[Moment]) -> Floats:
         """Return the columns of moments whitened and in blocks, (v, moments·d).
 
         In a run whose moment it is not a step is nothing or all: these two are whitened once.
         """
-        width = max(sum(run == n for run, _ in moments) for n in range(len(self.traces)))
+        width = max(sum(run == n for run, *_ in moments) for n in range(len(self.traces)))
         raw, chosen = [], []
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
             after = np.zeros((len(trace.time_s), width + 2))
             after[:, width] = 1.0
-            own = [i for i, (run, _) in enumerate(moments) if run == number]
+            own = [i for i, (run, *_) in enumerate(moments) if run == number]
             for column, i in enumerate(own):
                 after[:, column] = trace.time_s >= moments[i][1]
-            at = np.array(
-                [width if self._is_later(number, run) else width + 1 for run, _ in moments], dtype=int
-            )
+            at = np.array([width + 1 - self._is_in(number, each) for each in moments], dtype=int)
             at[own] = np.arange(len(own))
             raw.append(_lifted(after, unit))
             chosen.append(at)
@@ -82,10 +86,11 @@ class Steps:
             into[:] = part.reshape(len(part), -1, d)[:, at]
         return columns.reshape(len(white), -1)
 
-    def _is_later(self, number: int, run: int) -> bool:
-        """Tell whether a trace is of a later run than another."""
+    def _is_in(self, number: int, moment: Moment) -> bool:
+        """Tell whether all of another trace is behind a moment's step."""
+        run, _, stays = moment
         place_of = np.argsort(self.order)
-        return bool(place_of[number] > place_of[run])
+        return stays and bool(place_of[number] > place_of[run])
 
     def columns(self, moments: Sequence[Moment]) -> list[Floats]:
         """Return the columns (k, n, moments·d) of each trace."""
@@ -93,10 +98,10 @@ class Steps:
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
             after = np.stack(
                 [
-                    trace.time_s >= time
-                    if run == number
-                    else np.full(len(trace.time_s), self._is_later(number, run))
-                    for run, time in moments
+                    trace.time_s >= moment[1]
+                    if moment[0] == number
+                    else np.full(len(trace.time_s), self._is_in(number, moment))
+                    for moment in moments
                 ],
                 axis=1,
             )
@@ -168,7 +173,7 @@ def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
         Columns(fine[:, best * d : (best + 1) * d]),
         (np.eye(d),),
         signs,
-        at=finer[best],
+        at=finer[best][:2],
         cost=cost,
     )
-    return None if found is None else found.flipped_as(log_mean(flipped))
+    return None if found is None else replace(found, flipped=log_mean(flipped), stays=finer[best][2])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Floats
+from gcode2krl.effects.dependence import Dependence
 from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.directions import along_one
 from gcode2krl.gap.families.evidence import Evidence, evidence_of
@@ -18,6 +19,23 @@ from gcode2krl.gap.families.view import View
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.families
+_COMMANDED = (
+    *(
+        Dependence.OWN_ANGLE,
+        Dependence.MOTOR_ANGLE,
+        Dependence.REVERSALS,
+        Dependence.OWN_TORQUE,
+        Dependence.PLACE,
+    ),
+    *(
+        Dependence.VELOCITY,
+        Dependence.ACCELERATION,
+        Dependence.JERK,
+        Dependence.FORCE,
+        Dependence.FORCE_BY_PLACE,
+    ),
+)
+"""Where the robot is and what it does; what grows with time a drift of the instrument imitates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +52,11 @@ class Study:
 
     That goes on where so many flips end.
     """
+
+    command_p: float = 1.0
+    """The same of the largest of what the command gives, where each run's rest is moved in time.
+
+    Few strong stretches have few signs to flip, and yet do not stand where the robot turns back by chance."""
 
     def p_of(self, evidence: Evidence) -> float:
         """Return the same of one of its evidences."""
@@ -91,7 +114,13 @@ def _study(view: View, found: Sequence[Evidence]) -> Study:
     if not found:
         return Study(view.chi2, (), 1.0)
     nats = max(each.unbounded for each in found)
-    return Study(view.chi2, simplest_first(best.values()), _p(found, nats), _tail_p(_largest(found), nats))
+    return Study(
+        view.chi2,
+        simplest_first(best.values()),
+        _p(found, nats),
+        _tail_p(_largest(found), nats),
+        command_p(found),
+    )
 
 
 def _largest(found: Sequence[Evidence]) -> Floats:
@@ -104,6 +133,19 @@ def _p(found: Sequence[Evidence], nats: float) -> float:
     """Return p of an evidence, from the largest over all families for random signs of stretches."""
     random = _largest(found)
     return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))
+
+
+def command_p(found: Sequence[Evidence]) -> float:
+    """Return p of the largest evidence of what the command alone gives, where runs are moved in time.
+
+    Of its root, which is as an amplitude: the evidence itself has a longer tail than Gumbel's.
+    """
+    given = [each for each in found if each.on in _COMMANDED]
+    nats = max((each.unbounded for each in given), default=0.0)
+    if nats < _LIMITS.gap_evidence or not len(given[0].moved):
+        return 1.0
+    moved = np.max(np.stack([each.moved for each in given]), axis=0)
+    return _tail_p(np.sqrt(np.maximum(moved, 0.0)), nats**0.5)
 
 
 def _tail_p(random: Floats, nats: float) -> float:

@@ -19,6 +19,8 @@ _LEAST_SAYING = 3
 """Components: fewer cannot outvote one that has an effect."""
 _MEDIAN_VARIANCE = float(np.pi / 2.0)
 """Of a median of normal values, over that of their mean (Kenney & Keeping 1962)."""
+_MOVED_BY = (0.05, 0.95)
+"""Shares of a run by which its residual is moved."""
 _KNOWN = 0.1
 """Of the variance before any data, the most that is left of what a component knows."""
 
@@ -34,14 +36,19 @@ class View:
     """(g, v) 1 where a block belongs to a stretch of time."""
     components: Ints
     """(v,) the component of each block."""
+    runs: Ints
+    """(v,) the number of the run of each block."""
+    moves: int = 0
+    """Of the residual in time; none of joints, whose models are off where they accelerate hard."""
     kept: tuple[int, ...] | None = None
     """Which of the link's nuisance are in N; None: all."""
 
     @classmethod
     def of(cls, rows: Rows, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> "View":
         """Return the view of residuals (n, k) with tangents (k, n, t) of the effects in the model."""
+        moves = 0 if rows.traces[0].link.of_joints else THRESHOLDS.families.moves
         left = rows.of([each.T[:, :, None] for each in residuals])[:, 0]
-        return cls(left, rows.of(tangents), rows.nuisance, rows.members, rows.components)
+        return cls(left, rows.of(tangents), rows.nuisance, rows.members, rows.components, rows.runs, moves)
 
     def beside(self, residual: Floats, tangents: Floats) -> "View":
         """Return the view of the same rows with another residual (v,) and other tangents (v, t)."""
@@ -82,6 +89,8 @@ class View:
             self.nuisance.of(rows, columns[t:]),
             self.members[:, np.flatnonzero(rows)],
             self.components[rows],
+            self.runs[rows],
+            self.moves,
             tuple(np.flatnonzero(columns[t:]).tolist()),
         )
 
@@ -164,6 +173,30 @@ class View:
         """(g, t + m) sums over stretches of F times the projected residual."""
         sums: Floats = self.by_stretch(self.projected) @ self.fixed
         return sums
+
+    @cached_property
+    def moved(self) -> Floats:
+        """(moves, v) the projected residual, each run's moved in time, around its end, and of either sign.
+
+        The noise of a tracker or a force sensor knows no moment of the command: so moved it is as probable.
+        """
+        generator = np.random.default_rng(0)
+        runs = int(self.runs.max(initial=0)) + 1
+        shares = generator.uniform(*_MOVED_BY, (self.moves, runs))
+        signs = np.where(generator.random((self.moves, runs)) < 0.5, -1.0, 1.0)
+        moved = np.empty((self.moves, len(self.projected)))
+        begins = np.flatnonzero(np.diff(self.runs, prepend=-1) | np.diff(self.components, prepend=-1))
+        for first, last in zip(begins, [*begins[1:], len(self.runs)], strict=True):
+            rest, run = self.projected[first:last], self.runs[first]
+            by = np.round(shares[:, run] * len(rest)).astype(np.int64)
+            # all components of a run together: what moves them at once does so then, too
+            moved[:, first:last] = signs[:, [run]] * rest[(np.arange(len(rest)) - by[:, None]) % len(rest)]
+        return moved
+
+    @cached_property
+    def moved_cross(self) -> Floats:
+        """(moves, t + m) Fᵀ times each."""
+        return self.moved @ self.fixed
 
     @cached_property
     def is_within(self) -> bool:

@@ -75,6 +75,7 @@ def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
         tests=told.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
         run=None if moment is None else traces[moment[0]].run,
+        in_later_runs=evidence.stays if is_step else None,
         line=None if moment is None else line_at(traces[moment[0]].inputs, moment[1]),
         size=judgement.factor * float(np.linalg.norm(largest)),
         unit=judgement.link.unit,

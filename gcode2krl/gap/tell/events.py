@@ -32,18 +32,20 @@ def events_of(judgement: Judgement) -> Iterator[EventResult]:
 
 
 def impulses_of(judgement: Judgement) -> Iterator[DependsOnResult]:
-    """Yield the impulses of a link as what its gap depends on, the largest first."""
-    impulses = sorted(judgement.impulses, key=lambda event: -event.power)
+    """Yield the impulses of a link, or the slips that are its gap, the largest first."""
+    found = judgement.impulses or (() if judgement.told.significant else judgement.slips)
+    impulses = sorted(found, key=lambda event: -event.power)
     power = sum(event.power for event in impulses)
     power += max(judgement.size.excess_before, 0.0) * judgement.size.rows
     for event in impulses[: THRESHOLDS.tell.most_alike]:
-        length = float(np.linalg.norm(event.peak))
+        off = event.change if event.whose is Whose.SLIP else event.peak
+        length = float(np.linalg.norm(off))
         is_vector = len(event.peak) == 3 and not judgement.link.of_joints
         yield DependsOnResult(
             link=event.link,
             at=_at(event, judgement),
             on=Dependence.RUN_TIME.value,
-            form=IMPULSE,
+            form="step" if event.whose is Whose.SLIP else IMPULSE,
             probability=THRESHOLDS.tell.impulse_probability,
             share=event.power / max(power, 1e-300),
             at_time_s=event.at_s,
@@ -51,7 +53,7 @@ def impulses_of(judgement: Judgement) -> Iterator[DependsOnResult]:
             line=event.line,
             size=judgement.factor * length,
             unit=judgement.link.unit,
-            direction=tuple((event.peak / length).tolist()) if is_vector and length > 0.0 else None,
+            direction=tuple((off / length).tolist()) if is_vector and length > 0.0 else None,
         )
 
 

@@ -253,6 +253,8 @@ class DependsOnResult:
     at_time_s: float | None = None
     """Of a step or an impulse, its moment in `run`; in the JSON object ``t_s`` too."""
     run: str | None = None
+    in_later_runs: bool | None = None
+    """Of a step, whether it stays: between runs somebody may have mended it."""
     line: int | None = None
     """Of the G-code, at that moment."""
     size: float | None = None

@@ -198,7 +198,8 @@ def _form(found: DependsOnResult) -> str:
     if found.form in ("step", "impulse") and found.at_time_s is not None:
         line = f", line {found.line}" if found.line else ""
         at = f"{found.at_time_s:.1f} s" + (f" of {found.run}{line}" if found.run else "")
-        return f"a step from {at} on" if found.form == "step" else f"an impulse at {at}"
+        gone = ", gone in the next run" if found.in_later_runs is False else ""
+        return f"a step from {at} on{gone}" if found.form == "step" else f"an impulse at {at}"
     if found.frequency_hz is not None:
         return f"a tone of {number(found.frequency_hz)} Hz"
     return _FORMS.get(found.form, "a function of {on}").format(on=found.on)

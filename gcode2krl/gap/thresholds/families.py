@@ -26,6 +26,7 @@ class FamilyThresholds:
 
     # Null
     flips: int = convention(200, "random signs of stretches: p of half a percent can be told")
+    moves: int = convention(100, "of each run in time: their mean and deviation are known to a tenth")
     significant_p: float = convention(0.01, "a family explains some of the rest from this p on")
     least_evidence: float = convention(4.6, "log 100: less evidence, over its inflation, is none")
 
