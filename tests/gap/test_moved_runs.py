@@ -80,7 +80,7 @@ def test_a_moved_run_is_the_run_and_all_its_components_move_together():
 def test_what_turns_back_with_the_robot_is_no_noise():
     draw = np.random.default_rng(1)
     late = np.linspace(0.2, 1.0, COUNT)
-    rest = [draw.standard_normal(COUNT) + 3.0 * late * command(number)[:, 0] for number in range(RUNS)]
+    rest = [draw.standard_normal(COUNT) + 4.0 * late * command(number)[:, 0] for number in range(RUNS)]
     assert command_p([evidence(rest)]) <= THRESHOLDS.families.gap_p
     assert command_p([evidence(rest, Dependence.TRAVEL)]) == 1.0
 

@@ -142,7 +142,8 @@ def command_p(found: Sequence[Evidence]) -> float:
     """
     given = [each for each in found if each.on in _COMMANDED]
     nats = max((each.unbounded for each in given), default=0.0)
-    if nats < _LIMITS.gap_evidence or not len(given[0].moved):
+    # of less a sound robot may have as much where its force is
+    if nats < _LIMITS.certain_evidence or not len(given[0].moved):
         return 1.0
     moved = np.max(np.stack([each.moved for each in given]), axis=0)
     return _tail_p(np.sqrt(np.maximum(moved, 0.0)), nats**0.5)
