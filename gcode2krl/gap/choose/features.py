@@ -1,6 +1,5 @@
 """The results of all tests of a cause, gathered: what its probability is made of, and what the JSON shows."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from gcode2krl.effects import Role
@@ -8,11 +7,9 @@ from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
 from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.rivals import Rival
 from gcode2krl.gap.families.evidence import Evidence
-from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.gap.families.nested import lead_nats
 
-_LIMITS = THRESHOLDS.choose
 MOST_NATS = 1000.0
 """Evidence beyond it says no more; also where there is nothing to compare with."""
 _DIGITS = 4
@@ -52,16 +49,8 @@ class Features:
     """Of the gap on held-out data, the share that all causes of the link take."""
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
-    rest_share: float
-    """Of the gap, what the best family there takes beside all causes; 0 if insignificant."""
-    rival_nats: float
-    """By how much the best effect that the data can tell from it is worse."""
-    alike: int
-    """Number of effects that the data cannot tell from it."""
     causes: int
     """Number of causes that were accepted in the link."""
-    links_missing: int
-    """Number of links without data."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -84,7 +73,10 @@ class FamilyFeatures:
     """What is known of a family that the rest of a gap depends on."""
 
     lead_nats: float
-    """Its evidence over that of the best other family of its signal or of none, over the inflation."""
+    """By how much it is ahead of the best other family of its signal or of none, over the inflation.
+
+    One that contains it counts for as much less as it may be ahead (`families.nested`). A step and a drift
+    say the same: that it depends on time."""
     share: float
     """Of the gap's power, what it takes."""
     p: float
@@ -104,10 +96,11 @@ FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 def family_features(rest: Rest, evidence: Evidence, larger_links: int = 0) -> FamilyFeatures:
     """Return the features of a family of a rest; those of other signals, of another joint, are no rivals."""
-    rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
-    other = max((each.nats for each in rivals if each is not evidence), default=0.0)
+    of_signal = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
+    leads = [lead_nats(evidence, each) for each in of_signal if each.says != evidence.says]
+    own = evidence.nats - evidence.swapped_nats
     return FamilyFeatures(
-        lead_nats=_within((evidence.nats - max(other, 0.0)) / rivals[0].inflation),
+        lead_nats=_within(min([own, *leads]) / of_signal[0].inflation),
         share=rest.share(evidence),
         p=rest.study.p_of(evidence),
         of_largest=min(max(evidence.nats, 0.0) / max(rest.study.evidences[0].nats, 1.0), 1.0),
@@ -131,18 +124,13 @@ def features_of(
     number: int,
     *,
     tests: FamilyTests,
-    rest: Rest,
     gap_p: float,
     constant: Constancy | None,
     parameters: dict[str, Interval],
-    rivals: Sequence[Rival],
     held_out: HeldOut,
 ) -> Features:
     """Return the features of an accepted effect."""
     chi2 = found.likelihood.chi2(found.without(number))
-    # by convention, not by the table, which is made from these numbers
-    told = [rival for rival in rivals if rival.behind_nats >= _LIMITS.alike_chi2 / 2.0]
-    near = [each for each in rest.worth_naming if tests.is_near(each)]
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(chi2 - found.fitted.chi2, 0.0) / found.data.values) ** 0.5,
@@ -159,11 +147,7 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
-        rest_share=max((rest.share(each) for each in near), default=0.0),
-        rival_nats=_within(min((each.behind_nats for each in told), default=MOST_NATS)),
-        alike=len(rivals) - len(told),
         causes=len(found.causes),
-        links_missing=len(found.question.upstream),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,
