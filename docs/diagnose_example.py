@@ -2,7 +2,7 @@
 
 python docs/diagnose_example.py              prints the report that the README shows; less than a minute
 python docs/diagnose_example.py --keep DIR   leaves prediction, page and pictures in a folder
-python docs/diagnose_example.py --pictures   draws docs/images/gap_backlash.png, and gap_page.png with Chromium
+python docs/diagnose_example.py --pictures   draws gap_backlash.png and, with Chromium, gap_page.png
 """
 
 import argparse

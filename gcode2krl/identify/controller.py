@@ -361,7 +361,10 @@ def _noise_at_rest(pieces: list[Piece], resolution: float) -> float:
     squares, freedom = 0.0, 0
     for piece in pieces:
         edge = int(np.argmin(piece.still))
-        for standstill in (piece.position_mm[:edge], piece.position_mm[len(piece.still) - 1 :: -1][: _tail(piece)]):
+        for standstill in (
+            piece.position_mm[:edge],
+            piece.position_mm[len(piece.still) - 1 :: -1][: _tail(piece)],
+        ):
             inner = standstill[: max(0, len(standstill) - 2)]  # the last samples may already be moving
             if len(inner) > 1:
                 squares += float(np.sum((inner - inner.mean(axis=0)) ** 2))
@@ -417,7 +420,9 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
     if weight > 1e-9:
         d_fitted = d - float(slope @ residual) / weight
         unexplained = residual + slope * (d_fitted - d)
-        half = QUANTILE_90 * math.sqrt(float(unexplained @ unexplained) / max(len(unexplained) - 2, 1) / weight)
+        half = QUANTILE_90 * math.sqrt(
+            float(unexplained @ unexplained) / max(len(unexplained) - 2, 1) / weight
+        )
     share = float(piece.cos_half[row]) / 2.0
     return CornerFit(
         source_line=int(piece.source_line[row]),

@@ -254,8 +254,8 @@ def _with_terms(
             added[key] = tuple(_three(row) for row in coefficients)
         if helps:
             text = (
-                f"the {what} holds more than weight and offset, {_rms(residual):.3g} {unit} rms (hose pack?): "
-                "the intervals do not cover how much of it counts as weight and offset"
+                f"the {what} holds more than weight and offset, {_rms(residual):.3g} {unit} rms "
+                "(hose pack?): the intervals do not cover how much of it counts as weight and offset"
             )
             issues.append(Issue("note", "remaining-offset", 0, text))
         else:

@@ -16,7 +16,7 @@ _LIMITS = THRESHOLDS.slips
 
 
 def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
-    """Return the pairs, those in air without forces, and a warning for each that nobody stated to be in air."""
+    """Return the pairs, those in air without forces; a warning for each that nobody stated."""
     found, issues = [], []
     simulators: dict[Simulator, Simulator] = {}
     for pair in pairs:
@@ -28,7 +28,9 @@ def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
         if stated or _is_nearer(pair, in_air):
             found.append(in_air)
             if not stated:
-                words = f"{pair.name}: the tip shows nothing of the predicted deflection: taken as a run in air"
+                words = (
+                    f"{pair.name}: the tip shows nothing of the predicted deflection: taken as a run in air"
+                )
                 remedy = "in_air = true in run.toml; false where something was cut"
                 issues.append(Issue("warning", "run-in-air", 0, words, remedy))
         else:

@@ -45,8 +45,8 @@ class SlipThresholds:
 
     air_share: float = convention(
         0.3,
-        "of the tip's error beside the predicted deflection, in each quarter of the cut: less than this without "
-        "it, and nothing was cut; an arm of twice the stiffness leaves as much either way",
+        "of the tip's error beside the predicted deflection, in each quarter of the cut: where less is left "
+        "without it, nothing was cut; an arm of twice the stiffness leaves as much either way",
     )
 
     force_unit_log: float = calibrated(

@@ -128,7 +128,9 @@ class _Fitting:
         sigma, freedom, covariance, slopes = self._noise(rows, sigma)
         variance = np.diag(covariance) / self._steps**2
         precision = 1.0 / variance - self._precision
-        by_rows = np.where(precision > 1e-3 / variance, self._steps / np.sqrt(np.maximum(precision, 1e-300)), np.inf)
+        by_rows = np.where(
+            precision > 1e-3 / variance, self._steps / np.sqrt(np.maximum(precision, 1e-300)), np.inf
+        )
         return Fit(self._u * self._steps, sigma, covariance, by_rows, all_rows & ~rows, slopes, freedom)
 
     def _widen(self, covariance: Floats) -> None:

@@ -221,9 +221,8 @@ def settled(readings: Readings, arm: Arm) -> tuple[Readings, Alignment]:
 
 def _strange(readings: Readings, arm: Arm, alignment: Alignment) -> Issue:
     """Say what does not fit, and which arm would."""
-    words = (
-        f"not the poses of {arm.model}: points are {alignment.off_mm:.0f} mm off (median) with any base and tool"
-    )
+    off_mm = f"{alignment.off_mm:.0f} mm"
+    words = f"not the poses of {arm.model}: points are {off_mm} off (median) with any base and tool"
     if alignment.is_mirrored:
         words = f"not the poses of {arm.model}: the points are mirrored, as by a joint's wrong sign"
     elif not 0.97 < alignment.scale < 1.03:
@@ -398,7 +397,9 @@ def _again(poses: Poses, index: Ints, q_rad: Floats, good: Bools) -> Floats:
     for pose in np.unique(key[good]):
         readings = poses.measured_mm[good & (key == pose)]
         if len(readings) > 1:
-            deviations.append((readings - readings.mean(axis=0)) * np.sqrt(len(readings) / (len(readings) - 1.0)))
+            deviations.append(
+                (readings - readings.mean(axis=0)) * np.sqrt(len(readings) / (len(readings) - 1.0))
+            )
     return np.concatenate(deviations)
 
 
