@@ -136,7 +136,7 @@ def measure(options):
             recorder,
             force=force,
             stop=stop,
-            told=lambda now: phases.update({now.phase.value: now.ipoc}),
+            on_change=lambda now: phases.update({now.phase.value: now.ipoc}),
         )
         seen = json.loads(peer.stdout.read())
         for one in busy:

@@ -58,6 +58,9 @@ def main() -> None:
         for old in place.glob("*.*"):
             old.unlink()
         folders.write_run(place, day, run, how, {})
+        head = place / "run.toml"
+        text = head.read_text(encoding="utf-8").replace("\n\n", "\nin_air = true\n\n", 1)
+        head.write_text(text, encoding="utf-8")
         for table in place.glob("*.parquet"):
             pl.read_parquet(table).write_csv(table.with_suffix(".csv"), null_value="NaN")
             table.unlink()

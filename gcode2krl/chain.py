@@ -65,10 +65,10 @@ class Plan:
         Among them are the collisions on the motions that a Motion does not show (`clearance`).
         """
         targets, cell = self.targets, self.cell
-        found = (*self.joints.issues, *collisions_beside(self.ways, targets, cell))
-        issues = (*targets.issues, *program.below_table(targets, cell), *found)
+        issues = (*self.joints.issues, *collisions_beside(self.ways, targets, cell))
+        of_targets = (*targets.issues, *program.below_table(targets, cell), *issues)
         return replace(
-            self, targets=replace(targets, issues=issues), joints=replace(self.joints, issues=found)
+            self, targets=replace(targets, issues=of_targets), joints=replace(self.joints, issues=issues)
         )
 
     def with_corners(self, tolerance_mm: float | None) -> tuple["Plan", float]:

@@ -208,12 +208,12 @@ def _grouped(issues: Iterable[Issue], key: Callable[[Issue], Hashable]) -> list[
     return [tuple(group) for group in groups.values()]
 
 
-def _counted(issues: Sequence[Issue], one: str, several: str) -> Iterator[str]:
+def _counted(issues: Sequence[Issue], singular: str, plural: str) -> Iterator[str]:
     """Yield the line that counts findings with their codes, nothing where there are none."""
     if issues:
         counts = Counter(issue.code for issue in issues)
         named = ", ".join(f"{code} {count:,}" for code, count in counts.most_common())
-        yield f"… and {len(issues):,} {one if len(issues) == 1 else several}: {named}"
+        yield f"… and {len(issues):,} {singular if len(issues) == 1 else plural}: {named}"
 
 
 class Gcode2KrlError(Exception):

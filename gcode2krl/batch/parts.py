@@ -41,9 +41,9 @@ def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None 
     """
     named = list(words)
     several = len(named) > 1
-    found = [part for word in named for part in _of_word(word, Path(), cell, job, several)]
+    all_parts = [part for word in named for part in _of_word(word, Path(), cell, job, several)]
     parts: dict[str, BatchPart] = {}
-    for part in sorted(found, key=lambda one: one.key):
+    for part in sorted(all_parts, key=lambda one: one.key):
         other = parts.setdefault(part.key, part)
         if other.file.resolve() != part.file.resolve() or (other.cell, other.job) != (part.cell, part.job):
             _refuse_alike(other.file, part.file, part.key)
@@ -53,21 +53,21 @@ def find_parts(words: Iterable[str], cell: Path | None = None, job: Path | None 
 
 
 def _of_word(
-    word: str, beside: Path, cell: Path | None, job: Path | None, several: bool
+    word: str, folder: Path, cell: Path | None, job: Path | None, several: bool
 ) -> Iterator[BatchPart]:
-    """Yield the parts of a word; relative names begin at the folder ``beside``."""
-    if word.startswith(_SIGN_OF_LIST) and not (beside / word).exists():
-        yield from _of_list(Path(beside / word[1:]), cell, job)
+    """Yield the parts of a word; relative names begin at ``folder``."""
+    if word.startswith(_SIGN_OF_LIST) and not (folder / word).exists():
+        yield from _of_list(Path(folder / word[1:]), cell, job)
         return
-    place = beside / word
+    place = folder / word
     if place.is_dir():
         yield from _of_folder(place, cell, job, several)
     elif place.suffix.lower() == ".toml":
         yield from _of_table(place)
     elif place.is_file():
-        yield BatchPart(place.name if not beside.parts else _below(word), place, cell, job)
+        yield BatchPart(place.name if not folder.parts else _below(word), place, cell, job)
     elif glob.has_magic(word):
-        yield from _of_pattern(word, beside, cell, job)
+        yield from _of_pattern(word, folder, cell, job)
     else:
         sentence = "no such file or folder"
         raise input_error(
@@ -92,15 +92,15 @@ def _of_folder(folder: Path, cell: Path | None, job: Path | None, several: bool)
         yield BatchPart(f"{name}/{below}" if several and name else below, file, cell, job)
 
 
-def _of_pattern(word: str, beside: Path, cell: Path | None, job: Path | None) -> Iterator[BatchPart]:
+def _of_pattern(word: str, folder: Path, cell: Path | None, job: Path | None) -> Iterator[BatchPart]:
     """Yield the files of a pattern; shells on Windows leave it to the program."""
     steps = PurePath(word).parts
     plain = next(k for k, step in enumerate(steps) if glob.has_magic(step))
-    root = beside.joinpath(*steps[:plain])
+    root = folder.joinpath(*steps[:plain])
     files = [file for file in root.glob(str(PurePath(*steps[plain:]))) if file.is_file()]
     if not files:
         sentence = "no file is named like this"
-        raise input_error("file-unreadable", sentence, "correct the pattern", source=str(beside / word))
+        raise input_error("file-unreadable", sentence, "correct the pattern", source=str(folder / word))
     for file in files:
         yield BatchPart(file.relative_to(root).as_posix(), file, cell, job)
 
@@ -170,6 +170,6 @@ def _below(word: str) -> str:
     return path.name if path.is_absolute() or ".." in path.parts else path.as_posix()
 
 
-def _refuse_alike(one: Path, other: Path, name: str) -> None:
-    sentence = f"{one} and {other} would both be written as {name}"
+def _refuse_alike(first: Path, second: Path, name: str) -> None:
+    sentence = f"{first} and {second} would both be written as {name}"
     raise input_error("output-is-input", sentence, "rename one, or give each folder its own batch")

@@ -94,12 +94,12 @@ def plan(
 
 def _order_of(part: BatchPart, order: Order, stated: Collection[str] | None) -> Order:
     """Return the order of a part: its cell and job where it has its own, else its project's."""
-    own = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
+    of_part = replace(order, part=part.file, cell_path=part.cell, job_path=part.job)
     if stated is None:
-        return own
-    given = {name for name in ("cell_path", "job_path") if getattr(own, name) is not None}
+        return of_part
+    given = {name for name in ("cell_path", "job_path") if getattr(of_part, name) is not None}
     project = project_of(part.file).without({*stated, *given}, {field.name for field in fields(Order)})
-    return replace(own, **project.options, project=project)
+    return replace(of_part, **project.options, project=project)
 
 
 def _read_cell(cell_path: str | Path | None, job_path: str | Path | None, *, alone: bool) -> _Cell:
@@ -114,15 +114,15 @@ def _read_cell(cell_path: str | Path | None, job_path: str | Path | None, *, alo
     return _Cell(cell_of(cell, cell_path)["sha256"], tuple(files), tuple(cell.program.externals))
 
 
-def _planned(part: BatchPart, cell: _Cell, own: Order, page: str) -> Planned:
+def _planned(part: BatchPart, cell: _Cell, order: Order, page: str) -> Planned:
     try:
         size_bytes, sha256 = likely_text_bytes(part.file), sha256_of(part.file)
     except OSError:  # reading it reports it
         size_bytes, sha256 = 0, ""
-    key = key_of(sha256, cell.sha256, dict(_settings(own, page))) if sha256 and cell.sha256 else ""
-    subprograms = subprogram_files(own.part, own.search) if sha256 else ()
-    inputs = (part.file, *cell.files, *files_of_job(None, own.tools_path), *subprograms)
-    return Planned(part, Task(own, page), inputs, size_bytes, sha256, cell.sha256, key)
+    key = key_of(sha256, cell.sha256, dict(_settings(order, page))) if sha256 and cell.sha256 else ""
+    subprograms = subprogram_files(order.part, order.search) if sha256 else ()
+    inputs = (part.file, *cell.files, *files_of_job(None, order.tools_path), *subprograms)
+    return Planned(part, Task(order, page), inputs, size_bytes, sha256, cell.sha256, key)
 
 
 def _settings(order: Order, page: str) -> Iterator[tuple[str, Any]]:

@@ -106,7 +106,7 @@ def _is_there(file: Path, sha256: str) -> bool:
 def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -> Record:
     """Return the line of a part: its record with the names of this batch, whoever computed it and when."""
     part, cell = planned.part, record["cell"]
-    found: Record = {
+    line: Record = {
         **record,
         "input": record["input"] and record["input"] | {"file": str(part.file)},
         "cell": cell and cell | {"file": None if part.cell is None else str(part.cell)},
@@ -115,11 +115,11 @@ def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -
         "sha256": {f"{part.folder}{name}": sha256 for name, sha256 in record["sha256"].items()},
     }
     if planned.note is not None:
-        counts = dict(found["counts"])
+        counts = dict(line["counts"])
         counts["notes"] += 1
-        found |= {"counts": counts, "issues": [*found["issues"], *issue_dicts([planned.note])]}
+        line |= {"counts": counts, "issues": [*line["issues"], *issue_dicts([planned.note])]}
     ours = {"part": part.key, "seconds": round(seconds, 4), "cached": cached}
-    return {**found, **ours, "thumbnail": record.get("thumbnail"), "against": None}
+    return {**line, **ours, "thumbnail": record.get("thumbnail"), "against": None}
 
 
 def _options(planned: Planned, options: Record) -> Record:
@@ -131,8 +131,8 @@ def failed(planned: Planned, error: Gcode2KrlError) -> Record:
     """Return the record of a part of which nothing is known but why."""
     order = planned.task.order
     options = order.options() | ({"report": planned.task.page} if planned.task.page else {})
-    found = input_of(order.part)
-    return record_of("translate", _NOT_KNOWN, error.issues, exit_code=2, input=found, options=options)
+    source = input_of(order.part)
+    return record_of("translate", _NOT_KNOWN, error.issues, exit_code=2, input=source, options=options)
 
 
 def why_failed(failure: str) -> Issue:

@@ -56,15 +56,15 @@ def run_batch(
     all_bytes = sum(map(_weight, planned))
     done_bytes = 0.0
     to_compute = []
-    for one in planned:
-        record = _from_cache(one, out, cache)
+    for part in planned:
+        record = _from_cache(part, out, cache)
         if record is None:
-            to_compute.append(one)
+            to_compute.append(part)
             continue
-        done_bytes += _weight(one)
+        done_bytes += _weight(part)
         yield Line(record, done_bytes / all_bytes)
-    for one, record in _computed(to_compute, out, workers, cache):
-        done_bytes += _weight(one)
+    for part, record in _computed(to_compute, out, workers, cache):
+        done_bytes += _weight(part)
         yield Line(record, done_bytes / all_bytes)
     if cache is not None and to_compute:
         cache.prune()
@@ -112,12 +112,12 @@ def _computed(
 ) -> Iterator[tuple[Planned, Record]]:
     if not planned:
         return
-    costs_mb = [expected_mb(one.size_bytes, _has_whole_tables(one)) for one in planned]
+    costs_mb = [expected_mb(part.size_bytes, _has_whole_tables(part)) for part in planned]
     longest_first = sorted(range(len(planned)), key=lambda k: -planned[k].size_bytes)
     with workers(costs_mb) as crew:
-        for answer in crew.answers(make, [one.task for one in planned], costs_mb, longest_first):
-            one = planned[answer.task]
-            yield one, _finished(one, answer, out, cache)
+        for answer in crew.answers(make, [part.task for part in planned], costs_mb, longest_first):
+            part = planned[answer.task]
+            yield part, _finished(part, answer, out, cache)
 
 
 def _is_of(record: Record, planned: Planned) -> bool:

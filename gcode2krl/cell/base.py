@@ -53,7 +53,7 @@ class StatedCell:
 
 def lay_over_base(
     data: Table,
-    beside: Path | None,
+    folder: Path | None,
     source: str,
     is_confirmed: Callable[[StatedCell], bool],
     seen: tuple[Path, ...] = (),
@@ -63,11 +63,11 @@ def lay_over_base(
     ``is_confirmed`` tells whether a base is as a person confirmed it, ``seen`` holds the files that led here.
     Raises `NotUnderstoodError` where the base is not found, is not a cell file or is based on itself.
     """
-    table = _with_whole_paths(data, beside)
+    table = _with_whole_paths(data, folder)
     name = table.get("based_on", "")
     if not isinstance(name, str) or not name:
         return StatedCell(table, ())
-    base, whose = _base(name, beside, source, is_confirmed, seen), name
+    base, whose = _base(name, folder, source, is_confirmed, seen), name
     verified = isinstance(base.data.get("verified"), dict) and is_confirmed(base)
     below = {key: value for key, value in base.data.items() if key not in _OF_THE_FILE_ALONE}
     merged = _merge(_without_replaced(below, table), table, ())
@@ -101,7 +101,7 @@ def is_demonstration(name: str) -> bool:
 
 def _base(
     name: str,
-    beside: Path | None,
+    folder: Path | None,
     source: str,
     is_confirmed: Callable[[StatedCell], bool],
     seen: tuple[Path, ...],
@@ -115,7 +115,7 @@ def _base(
             'write based_on = "demonstration" or based_on = "other.toml"',
             source=source,
         )
-    file = ((beside or Path()) / name).resolve()
+    file = ((folder or Path()) / name).resolve()
     if file in seen or len(seen) > 8:
         raise input_error(
             "cell-base", f"based_on: {name[:60]!r} is based on itself", "name another cell", source=source
@@ -130,49 +130,49 @@ def _base(
     return lay_over_base(data, file.parent, str(file), is_confirmed, (*seen, file))
 
 
-def _with_whole_paths(data: Table, beside: Path | None) -> Table:
+def _with_whole_paths(data: Table, folder: Path | None) -> Table:
     """Return the file with its relative paths joined to its folder, so that they hold from anywhere."""
     table = dict(data)
-    if beside is None:
+    if folder is None:
         return table
     for section, key in _FILES:
         if isinstance(table.get(section), dict):
-            table[section] = _whole_path(table[section], key, beside)
+            table[section] = _whole_path(table[section], key, folder)
     if isinstance(table.get("obstacle"), list):
         table["obstacle"] = [
-            _whole_path(each, "mesh", beside) if isinstance(each, dict) else each
-            for each in table["obstacle"]
+            _whole_path(obstacle, "mesh", folder) if isinstance(obstacle, dict) else obstacle
+            for obstacle in table["obstacle"]
         ]
     tools = table.get("tool")
     if isinstance(tools, dict):
         table["tool"] = {
-            number: _whole_path(tool, "model", beside) if isinstance(tool, dict) else tool
+            number: _whole_path(tool, "model", folder) if isinstance(tool, dict) else tool
             for number, tool in tools.items()
         }
     return table
 
 
-def _whole_path(section: Table, key: str, beside: Path) -> Table:
+def _whole_path(section: Table, key: str, folder: Path) -> Table:
     value = section.get(key)
     is_name = key == "model" and not str(value).endswith(".toml")
     if not isinstance(value, str) or is_name or "\0" in value:
         return section
-    return {**section, key: str((beside / value).resolve())}
+    return {**section, key: str((folder / value).resolve())}
 
 
-def _without_replaced(base: Table, own: Table) -> Table:
+def _without_replaced(base: Table, stated: Table) -> Table:
     """Return the base without the values that a value of the file itself makes meaningless."""
     kept = dict(base)
-    if _states(own, "robot", {"model", "geometry"}):  # another arm: nothing of the base's is true of it
+    if _states(stated, "robot", {"model", "geometry"}):  # another arm: nothing of the base's is true of it
         kept.pop("robot", None)
         kept["compliance"] = _end_effector_only(kept.get("compliance"))
-    if _states(own, "controller", {"model"}):
+    if _states(stated, "controller", {"model"}):
         kept.pop("controller", None)
-    if _states(own, "material", _FORCE_LAW_KEYS):
+    if _states(stated, "material", _FORCE_LAW_KEYS):
         kept.pop("material", None)
-    if _states(own, "stock", _SHAPE_KEYS) and isinstance(kept.get("stock"), dict):
+    if _states(stated, "stock", _SHAPE_KEYS) and isinstance(kept.get("stock"), dict):
         kept["stock"] = {key: value for key, value in kept["stock"].items() if key not in _SHAPE_KEYS}
-    tools, own_tools = kept.get("tool"), own.get("tool")
+    tools, own_tools = kept.get("tool"), stated.get("tool")
     if isinstance(tools, dict) and isinstance(own_tools, dict):
         kept["tool"] = {
             number: tool for number, tool in tools.items() if not _states(own_tools, number, _CUTTER_KEYS)

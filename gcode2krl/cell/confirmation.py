@@ -123,8 +123,8 @@ def confirmation_issues(cell: Cell) -> list[Issue]:
         return [Issue("warning", "cell-unsigned", 0, text, _REMEDY, key="verified")]
     different = cell.unconfirmed or ()
     issues = [
-        Issue("warning", _code(one), 0, sentence_of(one), _REMEDY, key=_place(one.key))
-        for one in different[:_MOST_NAMED]
+        Issue("warning", _code(value), 0, sentence_of(value), _REMEDY, key=_place(value.key))
+        for value in different[:_MOST_NAMED]
     ]
     if len(different) > _MOST_NAMED:
         text = f"{len(different) - _MOST_NAMED} more values are not as they were confirmed"
@@ -147,21 +147,20 @@ def changed_lines(cell: Cell) -> list[str]:
     return lines + ([f"and {len(different) - _MOST_NAMED} more"] if len(different) > _MOST_NAMED else [])
 
 
-def sentence_of(one: Unconfirmed) -> str:
+def sentence_of(diff: Unconfirmed) -> str:
     """Return ``frames.base.x_mm is 1610.0; 1600.0 was confirmed by N. N. on 2026-11-28``."""
-    who = f"confirmed by {one.by} on {one.date}"
-    if one.kind == "forged":
-        return f"the signature of {one.key} does not fit what it signs: it was edited after it was {who}"
-    if one.kind == "unsigned":
-        value = f" is {_around(one.now, '')};" if one.now else ":"
-        return f"{one.key}{value} nobody has confirmed it"
-    if one.kind == "new":
-        return f"{one.key} is {_around(one.now, '')}; it was not there when the section was {who}"
-    if one.kind == "removed":
-        return f"{one.key} is gone; {_around(one.was, '') or 'a value'} was {who}"
-    return (
-        f"{one.key} is {_around(one.now, one.was)}; {_around(one.was, one.now) or 'another value'} was {who}"
-    )
+    who = f"confirmed by {diff.by} on {diff.date}"
+    if diff.kind == "forged":
+        return f"the signature of {diff.key} does not fit what it signs: it was edited after it was {who}"
+    if diff.kind == "unsigned":
+        value = f" is {_around(diff.now, '')};" if diff.now else ":"
+        return f"{diff.key}{value} nobody has confirmed it"
+    if diff.kind == "new":
+        return f"{diff.key} is {_around(diff.now, '')}; it was not there when the section was {who}"
+    if diff.kind == "removed":
+        return f"{diff.key} is gone; {_around(diff.was, '') or 'a value'} was {who}"
+    is_now, was = _around(diff.now, diff.was), _around(diff.was, diff.now) or "another value"
+    return f"{diff.key} is {is_now}; {was} was {who}"
 
 
 def signers(verified: Verified) -> list[str]:
@@ -201,8 +200,8 @@ def _place(key: str) -> str:
     return re.sub(r"(?<=\.)\d+(?=\.|$)", lambda number: str(int(number[0]) - 1), key)
 
 
-def _code(one: Unconfirmed) -> str:
-    return "cell-unsigned" if one.kind == "forged" else "cell-changed"
+def _code(unconfirmed: Unconfirmed) -> str:
+    return "cell-unsigned" if unconfirmed.kind == "forged" else "cell-changed"
 
 
 def _digest(value: Any) -> str:

@@ -141,11 +141,11 @@ def with_tools(cell: Cell, path: Path) -> UnderJob:
     return UnderJob(under, tuple(issues))
 
 
-def differences(number: int, own: Tool, keys: Mapping[str, Any]) -> Iterator[Issue]:
+def differences(number: int, tool: Tool, keys: Mapping[str, Any]) -> Iterator[Issue]:
     """Yield a finding where a library's tool is another cutter than the cell's, which stays."""
-    wrong = [key for key in SHAPE if key in keys and differs(getattr(own, key), keys[key])]
+    wrong = [key for key in SHAPE if key in keys and differs(getattr(tool, key), keys[key])]
     if wrong:
-        words = ", ".join(f"{key} {keys[key]} and {getattr(own, key)} in the cell" for key in wrong)
+        words = ", ".join(f"{key} {keys[key]} and {getattr(tool, key)} in the cell" for key in wrong)
         remedy = f"correct [tool.{number}] of the cell, or renumber the tool in the CAM system"
         yield Issue("warning", "tool-differs", 0, f"T{number}: {words}; the cell's stays", remedy)
 
@@ -160,16 +160,16 @@ def job_files(path: Path) -> list[Path]:
     return [path, path.parent / mesh] if isinstance(mesh, str) else [path]
 
 
-def _differences(number: int, own: Tool, cutter: JobTool) -> Iterator[Issue]:
+def _differences(number: int, tool: Tool, cutter: JobTool) -> Iterator[Issue]:
     """Yield where the job's cutter is not that of the cell; its own is used in both cases."""
     remedy = f"correct [tool.{number}] of the cell, or put the right tool into the magazine"
-    if own.kind != cutter.kind or abs(own.diameter_mm - cutter.diameter_mm) > _SLACK_MM:
+    if tool.kind != cutter.kind or abs(tool.diameter_mm - cutter.diameter_mm) > _SLACK_MM:
         sentence = (
             f"T{number} is a {cutter.kind} cutter of {cutter.diameter_mm:g} mm in the job and "
-            f"{own.kind} of {own.diameter_mm:g} mm in the cell; the job's is used"
+            f"{tool.kind} of {tool.diameter_mm:g} mm in the cell; the job's is used"
         )
         yield Issue("warning", "tool-differs", 0, sentence, remedy)
-    out_mm, whole_mm = own.stick_out_mm, cutter.overall_length_mm
+    out_mm, whole_mm = tool.stick_out_mm, cutter.overall_length_mm
     if out_mm is not None and whole_mm is not None and out_mm > whole_mm + _SLACK_MM:
         sentence = (
             f"T{number} sticks out {out_mm:g} mm in the cell, and the whole cutter of the job has "
@@ -178,26 +178,26 @@ def _differences(number: int, own: Tool, cutter: JobTool) -> Iterator[Issue]:
         yield Issue("warning", "tool-differs", 0, sentence, remedy)
 
 
-def _tool_with(own: Tool, cutter: JobTool, number: int, source: str) -> Tool:
+def _tool_with(tool: Tool, cutter: JobTool, number: int, source: str) -> Tool:
     """Return the cell's tool with the job's cutter in it."""
-    stated = own.model_dump(exclude_none=True)
+    stated = tool.model_dump(exclude_none=True)
     given = cutter.model_dump(exclude_none=True, exclude={"overall_length_mm"})
     if cutter.kind == "ball":
         given["corner_radius_mm"] = 0.0
     if any(differs(stated.get(key), given.get(key)) for key in SHAPE):
         stated = {key: value for key, value in stated.items() if key in _OF_THE_CELL}
         stated["model"] = f"{cutter.kind} {cutter.diameter_mm:g} of the job"
-    if own.stick_out_mm is None and own.length_mm is not None and cutter.overall_length_mm is not None:
-        given["stick_out_mm"] = min(cutter.overall_length_mm, own.length_mm)
+    if tool.stick_out_mm is None and tool.length_mm is not None and cutter.overall_length_mm is not None:
+        given["stick_out_mm"] = min(cutter.overall_length_mm, tool.length_mm)
     given["source"] = f"the job {Path(source).name}"
     return _checked(Tool, stated | given, f"tool.{number}.", source)
 
 
-def differs(own: Any, given: Any) -> bool:
+def differs(stated: Any, given: Any) -> bool:
     """Tell whether two values of a key of a tool are not the same but for rounding."""
-    if isinstance(own, float) and isinstance(given, float):
-        return abs(own - given) > _SLACK_MM
-    return bool(own != given)
+    if isinstance(stated, float) and isinstance(given, float):
+        return abs(stated - given) > _SLACK_MM
+    return bool(stated != given)
 
 
 def _stock_of(job: Job, cell: Cell, folder: Path, source: str) -> tuple[Stock | None, list[Issue]]:
@@ -228,7 +228,9 @@ def _checked(model: type[_Model], values: dict[str, Any], place: str, source: st
         return model.model_validate(values)
     except ValidationError as error:
         issues = [
-            Issue("error", "job-key", 0, f"{place}{'.'.join(map(str, each['loc']))}: {each['msg']}", _REMEDY)
-            for each in error.errors(include_url=False)[:20]
+            Issue(
+                "error", "job-key", 0, f"{place}{'.'.join(map(str, detail['loc']))}: {detail['msg']}", _REMEDY
+            )
+            for detail in error.errors(include_url=False)[:20]
         ]
         raise NotUnderstoodError(issues, source) from None

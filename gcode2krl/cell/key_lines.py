@@ -135,7 +135,7 @@ class _Scanner:
             self._inline_table(path)
         else:
             kinds = _TEXTS if first in ('"', "'") else (_PLAIN,)
-            match = next((found for kind in kinds if (found := kind.match(self.text, self.at))), None)
+            match = next((matched for kind in kinds if (matched := kind.match(self.text, self.at))), None)
             if match is None:
                 raise _NotTomlError
             self._move_to(match.end())

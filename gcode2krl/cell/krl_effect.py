@@ -233,13 +233,13 @@ class _Run:
         self.exits.append([])
         end = self.block(_copied(state), frozenset(("ENDLOOP",)), depth)
         self.at += 1
-        left: _State | None = None
+        after: _State | None = None
         for way in self.exits.pop():
-            left = _joined(left, way)
-        if left is None and end is not None:
+            after = _joined(after, way)
+        if after is None and end is not None:
             self.endless = self.endless or "LOOP without EXIT"
             self.last = end
-        return left
+        return after
 
     def _while(self, state: _State | None, line: str, depth: int) -> _State | None:
         chosen = _condition(line[5:]).constant
@@ -376,10 +376,10 @@ def _condition(text: str) -> _Condition:
     if len(tokens) > 200:
         return _UNKNOWN
     try:
-        condition, left = _either(tokens, 0)
+        condition, end = _either(tokens, 0)
     except RecursionError:
         return _UNKNOWN
-    return condition if left == len(tokens) else _UNKNOWN
+    return condition if end == len(tokens) else _UNKNOWN
 
 
 def _either(tokens: list[str], at: int) -> tuple[_Condition, int]:

@@ -112,10 +112,10 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     return tables
 
 
-def _levels(found: dict[str, Any]) -> int:
+def _levels(table: dict[str, Any]) -> int:
     """Return how deeply tables and lists are nested, counting stops just beyond the limit."""
     level = 0
-    here: list[dict[str, Any] | list[Any]] = [found]
+    here: list[dict[str, Any] | list[Any]] = [table]
     while here and level <= MOST_LEVELS:
         level += 1
         inside = (part for one in here for part in (one.values() if isinstance(one, dict) else one))
@@ -123,10 +123,10 @@ def _levels(found: dict[str, Any]) -> int:
     return level
 
 
-def read_model(kind: str, model: str, beside: Path | None = None) -> dict[str, Any]:
+def read_model(kind: str, model: str, folder: Path | None = None) -> dict[str, Any]:
     """Read one model by its name, or by a path ending in ``.toml`` relative to the file that names it."""
     if model.endswith(".toml"):
-        return read_toml((beside or Path()) / model)
+        return read_toml((folder or Path()) / model)
     known = names(kind)
     by_folded_name = {_fold(name): file for name, file in known.items()}
     file = by_folded_name.get(_fold(model))

@@ -39,19 +39,19 @@ def load_cell(path: str | Path | None = None) -> Cell:
     text = library.read_text(file)
     data = library.parse_toml(text, str(file))
     try:
-        return resolve_cell(data, beside=file.parent, source=str(file))
+        return resolve_cell(data, folder=file.parent, source=str(file))
     except NotUnderstoodError as error:
         if error.source != str(file):
             raise
         raise NotUnderstoodError(with_lines(error.issues, text), error.source) from None
 
 
-def resolve_cell(data: dict[str, Any], beside: Path | None = None, source: str = "cell") -> Cell:
+def resolve_cell(data: dict[str, Any], folder: Path | None = None, source: str = "cell") -> Cell:
     """Lay ``data`` (a cell file as read) over its base, fill in the models, and check it."""
-    seen = (Path(source).resolve(),) if beside is not None else ()
+    seen = (Path(source).resolve(),) if folder is not None else ()
     try:
         _refuse_keys_of_tools(data)
-        stated = lay_over_base(data, beside, source, _is_confirmed, seen)
+        stated = lay_over_base(data, folder, source, _is_confirmed, seen)
         cell = _filled_in(stated)
     except NotUnderstoodError as error:
         raise NotUnderstoodError(error.issues, error.source or source) from None

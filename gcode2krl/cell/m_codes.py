@@ -230,11 +230,11 @@ class _Codes:
     def run_up(self, m_code: str) -> Iterator[Issue]:
         """Yield where M3 or M4 does not wait for the speed behind switching on."""
         key, spindle = f"m_code.{m_code}", self.spindle
-        own = self.out(_RUNS[m_code][0])
+        output = self.out(_RUNS[m_code][0])
         for case in self.of(m_code)[-1:]:
             effect = case.effect
             driven = [name for name in effect.signals if effect.signals[name].driven]
-            name = own if own in driven else next(iter(driven), None)
+            name = output if output in driven else next(iter(driven), None)
             if name is None or effect.calls or effect.stops > effect.signals[name].event:
                 return
             waited_s, levels = effect.waited_s(name), effect.waited_for(name)

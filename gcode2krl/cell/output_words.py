@@ -22,7 +22,7 @@ def reserved_outputs(cell: Cell) -> dict[str, str]:
         "the coolant": (spindle.flood_output, spindle.mist_output),
         "the online side": (link.t1_output, link.ready_output),
     }
-    found = {
+    reserved = {
         f"$OUT[{number}]": whose
         for whose, numbers in named.items()
         for number in numbers
@@ -30,8 +30,8 @@ def reserved_outputs(cell: Cell) -> dict[str, str]:
     }
     templates = {key: text for key, text in cell.templates().items() if key in _SPINDLE}
     for texts in rendered_widely(templates, _view(cell)).values():
-        found |= {name: "the spindle" for text in texts for name in effect_of(text).signals}
-    return found
+        reserved |= {name: "the spindle" for text in texts for name in effect_of(text).signals}
+    return reserved
 
 
 def switched_by_words(event: Event, cell: Cell) -> frozenset[str]:

@@ -184,9 +184,9 @@ def _union(on: Mapping[str, frozenset[str]], codes: tuple[str, ...]) -> frozense
     return frozenset().union(*(on.get(f"m_code.{code}", frozenset()) for code in codes))
 
 
-def _may_share(one: str, other: str) -> bool:
+def _may_share(first: str, second: str) -> bool:
     """Flood and mist may share one valve; any other shared signal is a mistake."""
-    return {one, other} == {"spindle.flood_output", "spindle.mist_output"}
+    return {first, second} == {"spindle.flood_output", "spindle.mist_output"}
 
 
 def _same_number(named: Mapping[str, int | None], what: str, may_share: Any) -> Iterator[Issue]:
@@ -204,7 +204,7 @@ def _pair(key: str, text: str, severity: Severity = "error") -> Issue:
     return Issue(severity, "cell-pair", 0, text, remedy, key=key)
 
 
-def _two_meanings(signal: str, one: str, other: str) -> Issue:
-    text = f"{signal} has two meanings: {one}, and {other}"
-    key = other.partition(" ")[0]  # "guard_inputs (door closed)": the list
-    return Issue("error", "signal-twice", 0, text, f"give {other} a signal of its own", key=key)
+def _two_meanings(signal: str, first: str, second: str) -> Issue:
+    text = f"{signal} has two meanings: {first}, and {second}"
+    key = second.partition(" ")[0]  # "guard_inputs (door closed)": the list
+    return Issue("error", "signal-twice", 0, text, f"give {second} a signal of its own", key=key)

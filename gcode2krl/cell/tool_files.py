@@ -228,8 +228,10 @@ def _freecad_library(file: Path, unit: str) -> Iterator[FileTool]:
     """FreeCAD's library: numbers and the files of bits, which stand beside it or in the folder ``Bit``."""
     for entry in json.loads(file.read_text(encoding="utf-8-sig"))["tools"]:
         name = Path(str(entry["path"])).name
-        beside = [folder / bits for folder in (file.parent.parent, file.parent) for bits in ("Bit", "bit")]
-        places = [folder / name for folder in (file.parent, *beside)]
+        bit_folders = [
+            folder / bits for folder in (file.parent.parent, file.parent) for bits in ("Bit", "bit")
+        ]
+        places = [folder / name for folder in (file.parent, *bit_folders)]
         bit = next((place for place in places if place.is_file()), None)
         if bit is None:
             yield FileTool(
@@ -266,9 +268,9 @@ _INCHES = re.compile(rb"^\s*(?:N\d+\s*)?(?:[^(;\n]*\s)?G(?:20|70)\b", re.MULTILI
 def _comments(file: Path, unit: str) -> Iterator[FileTool]:
     """Comments of HSM posts in a program: ``(T5 D=10. CR=0.5 - ZMIN=-2. - bullnose end mill)``."""
     data = file.read_bytes()
-    found = list(_HEADER.finditer(data.decode("latin-1")))
+    headers = list(_HEADER.finditer(data.decode("latin-1")))
     scale = _asked(unit, file) if unit else (MM_PER_INCH if _INCHES.search(data) else 1.0)
-    for said in found:
+    for said in headers:
         values = {
             "diameter_mm": _number(said[2]),
             "corner_radius_mm": _number(said[3]),
@@ -335,8 +337,8 @@ def _tool(number: Any, name: str, type_name: str, scale: float, stated: Mapping[
 
 def _number(value: Any) -> float | None:
     """Return the number at the start of a text, with a decimal comma too; None where there is none."""
-    found = re.match(r"\s*([-+]?(?:\d+[.,]?\d*|[.,]\d+))", str(value)) if value is not None else None
-    return float(found[1].replace(",", ".")) if found else None
+    match = re.match(r"\s*([-+]?(?:\d+[.,]?\d*|[.,]\d+))", str(value)) if value is not None else None
+    return float(match[1].replace(",", ".")) if match else None
 
 
 def _length_mm(value: Any) -> float | None:

@@ -119,11 +119,17 @@ class ArmInStock:
         borders = sorted({0, *rows[::_STRETCH_ROWS].tolist(), *due, last, len(motion)})
         for start, end in pairwise(borders):
             behind = None if end == len(motion) else end
-            own = rows[rows >= start] if behind is None else rows[(rows >= start) & (rows < end)]
+            inside_rows = rows[rows >= start] if behind is None else rows[(rows >= start) & (rows < end)]
             part = rows_of(motion, start, end), q_rad[start:behind], qd_rad_s[start:behind]
-            columns = before[own], q_rad[own], stood[own], external[own], line[own]
+            columns = (
+                before[inside_rows],
+                q_rad[inside_rows],
+                stood[inside_rows],
+                external[inside_rows],
+                line[inside_rows],
+            )
             ways = tuple(due.get(start, ()))
-            inside = Inside(*columns, ways) if len(own) or ways else None
+            inside = Inside(*columns, ways) if len(inside_rows) or ways else None
             yield (*part, ends and behind is None), inside
 
     def judge(self, inside: Inside) -> None:

@@ -115,8 +115,8 @@ def finding_lines(record: Record) -> Iterator[str]:
         return
     source = record["input"]["file"] if record["input"] else record["part"]
     issues = [
-        Issue(each["severity"], each["code"], each["line"], each["message"], each["remedy"])
-        for each in record["issues"]
+        Issue(issue["severity"], issue["code"], issue["line"], issue["message"], issue["remedy"])
+        for issue in record["issues"]
     ]
     lines = told(issues).findings
     for finding in lines[:_MOST_FINDINGS]:
@@ -156,11 +156,11 @@ def as_record(batch: Told, files: list[Path], seconds: float, options: Record) -
         "left": batch.parts - len(batch.records),
         "seconds": round(seconds, 3),
     }
-    found = record_of(
+    whole = record_of(
         "batch", figures, exit_code=batch.exit_code, options=options, files=hashes_of(map(str, files))
     )
     kinds = ("errors", "warnings", "notes")
-    return found | {
+    return whole | {
         "counts": {kind: sum(record["counts"][kind] for record in batch.records) for kind in kinds}
     }
 

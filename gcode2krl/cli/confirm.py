@@ -126,9 +126,9 @@ def _asked(
     confirmed = []
     for count, section in enumerate(sections, start=1):
         console.say(f"\n[{section}]  {count} of {len(sections)}")
-        for one in cell.unconfirmed or ():
-            if section_of(one.key) == section and one.kind != "unsigned":
-                console.say(f"  ! {sentence_of(one)}")
+        for value in cell.unconfirmed or ():
+            if section_of(value.key) == section and value.kind != "unsigned":
+                console.say(f"  ! {sentence_of(value)}")
         for row in _rows(cell, section, values.get(section, {}), lines):
             console.say(f"  {row}")
         if section == "robot" and not _is_this_robot(console, cell):
@@ -222,7 +222,7 @@ def _sign(cell: "Cell", cell_path: Path, before: bytes, by: str, day: str, secti
         ) from None
     text = with_signature(before.decode("utf-8"), signature.model_dump(mode="json", exclude_none=True))
     data = library.parse_toml(text.removeprefix("\ufeff"), str(cell_path))
-    as_signed = resolve_cell(data, beside=cell_path.parent, source=str(cell_path))
+    as_signed = resolve_cell(data, folder=cell_path.parent, source=str(cell_path))
     different = {section_of(one.key) for one in as_signed.unconfirmed or ()} & set(sections)
     if different or as_signed.unconfirmed is None:
         raise RuntimeError(f"the signature of {cell_path} does not fit what it signs: {sorted(different)}")

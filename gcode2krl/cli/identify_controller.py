@@ -304,7 +304,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: "Cell") -> Pa
     )
     values["sure"] = "checked"
     data = {**data, "controller": {**section, **values}}
-    resolve_cell(data, beside=file.parent, source=str(file))
+    resolve_cell(data, folder=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return file
 

@@ -179,7 +179,7 @@ def _apply(fit: "ForceFit", ranges: dict[str, list[float]], file: Path, run: "Ru
         "source": f"identified from {run.name}: {fit.samples} samples in cut, residual {fit.rms_N:.1f} N rms",
         "sure": "checked",
     }
-    resolve_cell(data, beside=file.parent, source=str(file))
+    resolve_cell(data, folder=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return file
 

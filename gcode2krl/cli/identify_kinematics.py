@@ -175,8 +175,8 @@ def _say(result: "Geometry", console: Console) -> None:
             textwrap.fill(f"{words}: {', '.join(names)}", 118, initial_indent="  ", subsequent_indent="    ")
         )
     console.say(f"  condition number of the told numbers {result.condition:.0f}")
-    for one, other, correlation in result.alike[:6]:
-        console.say(f"  hardly told apart: {one} and {other} (canonical correlation {correlation:.4f})")
+    for first, second, correlation in result.alike[:6]:
+        console.say(f"  hardly told apart: {first} and {second} (canonical correlation {correlation:.4f})")
 
 
 def _others(result: "Geometry") -> Iterator[tuple[str, list[str]]]:
@@ -194,16 +194,18 @@ def _others(result: "Geometry") -> Iterator[tuple[str, list[str]]]:
 
 
 def _noise_words(result: "Geometry") -> str:
-    left = f"{result.sigma_mm:.4f} mm of a coordinate are left"
+    residual = f"{result.sigma_mm:.4f} mm of a coordinate are left"
     if result.noise_mm is None:
-        return f"unknown (not stated, no poses visited again); {left}: noise, or what the fit does not know"
+        return (
+            f"unknown (not stated, no poses visited again); {residual}: noise, or what the fit does not know"
+        )
     more = result.sigma_mm / result.noise_mm
     verdict = (
         "as much as the noise"
         if more < 1.2
         else f"{more:.1f} times the noise: there is more than these numbers"
     )
-    return f"{result.noise_mm:.4f} mm of a coordinate ({result.noise_from}); {left}, {verdict}"
+    return f"{result.noise_mm:.4f} mm of a coordinate ({result.noise_from}); {residual}, {verdict}"
 
 
 _KEYS = (
@@ -292,9 +294,9 @@ def _section(readings: "Readings", arm: "Arm", options: "Options", file: Path) -
     if not arm.is_kuka:
         words = f"-o: no cell drives a {arm.model}"
         raise input_error("option-value", words, "--json has all numbers", source=readings.source)
-    entries, found = section_of(readings, arm, options)
+    entries, fit = section_of(readings, arm, options)
     resolve_cell({"effects": entries}, source=str(file))
-    words = f"{found.rms_before_mm:.3f} -> {found.rms_after_mm:.3f} mm rms at places left out"
+    words = f"{fit.rms_before_mm:.3f} -> {fit.rms_after_mm:.3f} mm rms at places left out"
     head = f"# What a cell can hold of this arm's errors, fitted without the others: {words}.\n"
     write_together({file: (head + tomli_w.dumps({"effects": entries})).encode("utf-8")})
     return f"{len(entries)} effects, fitted without what a cell cannot hold: {words}"
@@ -318,8 +320,8 @@ def _figure(result: "Geometry", file: Path) -> Path:
         ):
             top.plot(result.row[good], values[good], ".", color=colour, markersize=3.0, label=name)
         most = float(result.before_mm[good].max(initial=0.0))
-        rest = np.minimum(result.after_mm[~good], 1.2 * most)
-        top.plot(result.row[~good], rest, "x", color=VERMILION, markersize=4.0, label="no part of the fit")
+        shown = np.minimum(result.after_mm[~good], 1.2 * most)
+        top.plot(result.row[~good], shown, "x", color=VERMILION, markersize=4.0, label="no part of the fit")
         top.set(xlabel="line of the table", ylabel="off by mm", title="poses")
         top.legend(loc="upper right", ncols=3)
         edges = np.linspace(0.0, max(most, 1e-6), 60)

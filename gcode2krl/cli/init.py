@@ -156,7 +156,7 @@ def _resolved(text: str, cell_path: Path) -> "Cell":
     from gcode2krl.cell.library import parse_toml
 
     try:
-        return resolve_cell(parse_toml(text, str(cell_path)), beside=cell_path.parent, source=str(cell_path))
+        return resolve_cell(parse_toml(text, str(cell_path)), folder=cell_path.parent, source=str(cell_path))
     except NotUnderstoodError as error:
         issues = _quoted(with_lines(error.issues, text), text)
         raise RefusedError(issues, f"{cell_path}, not written") from None

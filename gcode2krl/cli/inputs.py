@@ -193,8 +193,8 @@ def options_of_project(function: Any) -> Any:
 
         context = click.get_current_context()
         stated = stated_options(context)
-        beside = Path("part") if part == STANDARD else Path(part)
-        project = Project() if isolated else project_of(beside).without(stated, options)
+        place = Path("part") if part == STANDARD else Path(part)
+        project = Project() if isolated else project_of(place).without(stated, options)
         context.params.update(project.options)
         return function(part=part, **(options | dict(project.options)), project=project)
 

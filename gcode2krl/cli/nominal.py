@@ -46,21 +46,24 @@ def with_comparison(prediction: "Prediction", comparison: "Comparison", nominal:
 def issues_of(prediction: "Prediction", comparison: "Comparison") -> list[Issue]:
     """Return a warning for each of the largest gouges, and a note on the rest."""
     toolpath, motion = prediction.toolpath, prediction.motion
-    gouges = [one for one in comparison.differences if one.kind == "gouge"]
+    gouges = [difference for difference in comparison.differences if difference.kind == "gouge"]
     issues = []
-    for one in gouges[:_MOST_NAMED]:
-        x, y, z = one.place_mm
+    for difference in gouges[:_MOST_NAMED]:
+        x, y, z = difference.place_mm
         sentence = (
-            f"cuts up to {one.depth_mm:.2f} mm into the nominal part at X {x:.2f} Y {y:.2f} Z {z:.2f} "
-            f"({one.volume_mm3:.1f} mm3)"
+            f"cuts up to {difference.depth_mm:.2f} mm into the nominal part at X {x:.2f} Y {y:.2f} Z {z:.2f} "
+            f"({difference.volume_mm3:.1f} mm3)"
         )
-        line = int(toolpath.source_line[motion.move[one.row]]) if motion is not None else 0
+        line = int(toolpath.source_line[motion.move[difference.row]]) if motion is not None else 0
         issues.append(Issue("warning", "nominal-gouge", line, sentence))
-    rest = [one for one in comparison.differences if one.kind == "rest"]
-    if rest:
-        count = len(rest) + comparison.left_out["rest"]
+    leftovers = [difference for difference in comparison.differences if difference.kind == "rest"]
+    if leftovers:
+        count = len(leftovers) + comparison.left_out["rest"]
         places = f"{count} places" if count > 1 else "one place"
-        volume_mm3, most_mm = comparison.volume_mm3["rest"], max(one.depth_mm for one in rest)
+        volume_mm3, most_mm = (
+            comparison.volume_mm3["rest"],
+            max(difference.depth_mm for difference in leftovers),
+        )
         sentence = f"up to {most_mm:.2f} mm of material is left in {places} ({volume_mm3:.1f} mm3)"
         issues.append(Issue("note", "nominal-rest", 0, sentence))
     return issues
@@ -70,10 +73,10 @@ def comparison_lines(comparison: "Comparison") -> list[str]:
     """Return the lines of the summary."""
     lines = []
     for kind, name in (("gouge", "gouges"), ("rest", "rest")):
-        own = [one for one in comparison.differences if one.kind == kind]
-        count = len(own) + comparison.left_out[own[0].kind] if own else 0
-        deepest = f", up to {max(one.depth_mm for one in own):.2f} mm" if own else ""
-        volume = f"{comparison.volume_mm3[own[0].kind]:.1f} mm3" if own else "none"
+        of_kind = [one for one in comparison.differences if one.kind == kind]
+        count = len(of_kind) + comparison.left_out[of_kind[0].kind] if of_kind else 0
+        deepest = f", up to {max(one.depth_mm for one in of_kind):.2f} mm" if of_kind else ""
+        volume = f"{comparison.volume_mm3[of_kind[0].kind]:.1f} mm3" if of_kind else "none"
         lines.append(f"  {name:<10} {volume}{f' in {count} places' if count > 1 else ''}{deepest}")
     return lines
 
@@ -85,12 +88,12 @@ def as_dict(comparison: "Comparison") -> dict[str, Any]:
         "left_out": dict(comparison.left_out),
         "differences": [
             {
-                "kind": one.kind,
-                "volume_mm3": one.volume_mm3,
-                "depth_mm": one.depth_mm,
-                "place_mm": one.place_mm.tolist(),
+                "kind": difference.kind,
+                "volume_mm3": difference.volume_mm3,
+                "depth_mm": difference.depth_mm,
+                "place_mm": difference.place_mm.tolist(),
             }
-            for one in comparison.differences
+            for difference in comparison.differences
         ],
     }
 
@@ -101,9 +104,9 @@ def solids(comparison: "Comparison") -> dict[str, bytes]:
 
     files = {}
     for kind, name in FILES.items():
-        own = [one.solid for one in comparison.differences if one.kind == kind]
-        if own:
-            both: Any = trimesh.util.concatenate(own)
+        meshes = [one.solid for one in comparison.differences if one.kind == kind]
+        if meshes:
+            both: Any = trimesh.util.concatenate(meshes)
             files[name] = bytes(both.export(file_type="stl"))
     return files
 
@@ -113,6 +116,6 @@ def on_page(comparison: "Comparison") -> dict[str, Any]:
     import numpy as np
 
     plain = as_dict(comparison)
-    for one, shown in zip(comparison.differences, plain["differences"], strict=True):
-        shown |= {"row": one.row, "triangles_mm": np.asarray(one.solid.triangles)}
+    for difference, shown in zip(comparison.differences, plain["differences"], strict=True):
+        shown |= {"row": difference.row, "triangles_mm": np.asarray(difference.solid.triangles)}
     return plain | {"above_mm": comparison.above_mm}

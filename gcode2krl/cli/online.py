@@ -440,7 +440,7 @@ def serve_command(
                 device,
                 socket,
                 recorder,
-                told=lambda now: console.hint(f"  {now.phase.value} {now.reason}".rstrip()),
+                on_change=lambda now: console.hint(f"  {now.phase.value} {now.reason}".rstrip()),
             )
         except KeyboardInterrupt:
             console.hint("stopped: the controller's own time-out stops the robot")

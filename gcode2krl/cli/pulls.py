@@ -120,6 +120,6 @@ def apply(fit: "PullFit", file: Path) -> Path:
         "robot_sure": "checked",
     }
     data = {**data, "compliance": section}
-    resolve_cell(data, beside=file.parent, source=str(file))
+    resolve_cell(data, folder=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return file

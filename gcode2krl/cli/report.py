@@ -58,11 +58,16 @@ def command(
             text = text_of(_gcode_file(prediction, place, gcode))
             stock_mm = stock_corners_mm(prediction.toolpath, prediction.cell)
             mesh = _nominal_file(prediction, place, nominal)
-            beside = on_page(compared(prediction, mesh)) if mesh is not None else None
+            nominal_on_page = on_page(compared(prediction, mesh)) if mesh is not None else None
             meshes_mm = obstacle_meshes(prediction.cell)
             part = part_of(prediction)
             content = content_of(
-                prediction, text=text, stock_mm=stock_mm, meshes_mm=meshes_mm, nominal=beside, part=part
+                prediction,
+                text=text,
+                stock_mm=stock_mm,
+                meshes_mm=meshes_mm,
+                nominal=nominal_on_page,
+                part=part,
             )
             write_page(content, file, files)
     except Gcode2KrlError as error:

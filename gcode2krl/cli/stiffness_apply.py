@@ -33,7 +33,7 @@ def apply(result: StiffnessIdentification, file: Path, cell: Cell) -> Path:
     joints = {**section.get("virtual_joints", {}), **dict(_values(result))}
     section = {**section, "virtual_joints": joints, **_robot(result, section, cell)}
     data = {**data, "compliance": {**section, **_end_effector(result, section, cell)}}
-    resolve_cell(data, beside=file.parent, source=str(file))
+    resolve_cell(data, folder=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return file
 

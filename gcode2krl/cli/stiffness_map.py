@@ -138,8 +138,8 @@ class Case:
         if load is not None and max(map(abs, load)) > MOST_LOAD_N:
             sentence = f"--load {load}: more than {MOST_LOAD_N:g} N"
             raise input_error("option-value", sentence, "give newtons")
-        own = None if load is None else np.array(load, dtype=float)
-        return cls(cell, number, own, np.array(feed if feed is not None else (0.0, 0.0, 0.0), dtype=float))
+        load_N = None if load is None else np.array(load, dtype=float)
+        return cls(cell, number, load_N, np.array(feed if feed is not None else (0.0, 0.0, 0.0), dtype=float))
 
     @property
     def spin_deg(self) -> float:

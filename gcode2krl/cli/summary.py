@@ -75,9 +75,9 @@ def _duration(seconds: float) -> str:
 
 
 def _files(written: WrittenProgram) -> str:
-    first, *rest = [str(file) for file in written.files]
-    parts = [name for name in rest if name.endswith(".src")]
-    others = [name for name in rest if not name.endswith(".src")]
+    first, *further = [str(file) for file in written.files]
+    parts = [name for name in further if name.endswith(".src")]
+    others = [name for name in further if not name.endswith(".src")]
     if len(parts) > 2:
         parts = [f"{len(parts)} parts {parts[0]} ... {parts[-1]}"]
     return ", ".join([first, *parts, *others])

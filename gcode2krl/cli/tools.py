@@ -113,8 +113,8 @@ def _in_cell(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> tuple
     from gcode2krl.cell import load_cell
     from gcode2krl.cell.job import differences
 
-    own = load_cell(cell_path).tool
-    there = {number: own[number] for number in sections if number in own}
+    tools = load_cell(cell_path).tool
+    there = {number: tools[number] for number in sections if number in tools}
     return there, [issue for n, tool in there.items() for issue in differences(n, tool, sections[n])]
 
 
@@ -131,7 +131,7 @@ def _added(sections: Mapping[int, Mapping[str, Any]], cell_path: str) -> list[Pa
     longer = (
         "\n\n".join([text.rstrip("\n"), *(_text(number, keys) for number, keys in sections.items())]) + "\n"
     )
-    resolve_cell(parse_toml(longer, cell_path), beside=file.parent, source=cell_path)
+    resolve_cell(parse_toml(longer, cell_path), folder=file.parent, source=cell_path)
     write_together({file: longer.encode()})
     return [file]
 

@@ -142,7 +142,7 @@ class Way:
         first = begin = len(self._last)
         gap, pair = np.empty(len(q)), np.empty(len(q), dtype=np.int32)
         size = max(_NOTES, len(self._watched.pairs))
-        found: list[tuple[Ints, Floats]] = []
+        noted_rows: list[tuple[Ints, Floats]] = []
         while first < len(q):
             notes, values = np.empty((size, 2), dtype=np.int64), np.empty((size, 4))
             noted = np.zeros(1, dtype=np.int64)
@@ -151,10 +151,10 @@ class Way:
                 *(self._horizon_mm, self._near_mm, int(self._is_sampled)),
                 *(gap, pair, notes, values, noted),
             )
-            found.append((notes[: noted[0]].copy(), values[: noted[0]].copy()))
+            noted_rows.append((notes[: noted[0]].copy(), values[: noted[0]].copy()))
         self._last, self._last_shift = q[-1:].copy(), shifted[-1:].copy()
-        notes = np.concatenate([np.zeros((0, 2), np.int64), *(each for each, _ in found)])
-        values = np.concatenate([np.zeros((0, 4)), *(each for _, each in found)])
+        notes = np.concatenate([np.zeros((0, 2), np.int64), *(block for block, _ in noted_rows)])
+        values = np.concatenate([np.zeros((0, 4)), *(block for _, block in noted_rows)])
         return Clearances(
             gap[begin:], pair[begin:], notes[:, 0] - begin, notes[:, 1], values[:, 0], values[:, 1:]
         )

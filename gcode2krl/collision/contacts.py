@@ -60,18 +60,18 @@ class Contacts:
 
     def take(
         self,
-        found: Clearances,
+        clearances: Clearances,
         names: list[tuple[str, str]],
         line: Ints32,
         to_base: Floats,
         way: str = "",
     ) -> None:
         """Add what was noted along rows (n): ``names`` of each pair, ``line`` (n,) of the G-code."""
-        base_mm = found.place_mm @ to_base[:3, :3].T + to_base[:3, 3]
-        lines, gap_mm = line[found.row], found.note_gap_mm
+        base_mm = clearances.place_mm @ to_base[:3, :3].T + to_base[:3, 3]
+        lines, gap_mm = line[clearances.row], clearances.note_gap_mm
 
-        for number in np.unique(found.note_pair).tolist():
-            notes = np.flatnonzero(found.note_pair == number)
+        for number in np.unique(clearances.note_pair).tolist():
+            notes = np.flatnonzero(clearances.note_pair == number)
             pair = self.pairs.setdefault(names[number], _Pair())
             deepest = notes[np.lexsort((gap_mm[notes], lines[notes]))]
             _, first = np.unique(lines[deepest], return_index=True)

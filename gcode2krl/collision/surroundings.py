@@ -94,8 +94,8 @@ def pairs_of(parts: list[Capsule], names: tuple[str, ...]) -> list[Pair]:
         last = UPPER_ARM - 1 if part.link == FOREARM else UPPER_ARM if part.kind == "arm" else ELBOW
         pairs += [
             (number, -1, other)
-            for other, each in enumerate(parts)
-            if each.link <= last and each.kind == "arm"
+            for other, other_part in enumerate(parts)
+            if other_part.link <= last and other_part.kind == "arm"
         ]
     return pairs
 

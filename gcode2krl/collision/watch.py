@@ -80,16 +80,16 @@ class Turning:
 
         Of a pair that comes near only between two rows the least gap is that of the steps between.
         """
-        found = _Found(
+        nearest = _Found(
             self._near_mm, np.full(len(q_rad), self._told_mm), np.full(len(q_rad), -1, dtype=np.int32)
         )
         known = np.isfinite(q_rad).all(axis=1)
-        found.gap_mm[~known] = np.nan
+        nearest.gap_mm[~known] = np.nan
         borders = np.flatnonzero(np.diff(known, prepend=False, append=False))
         if len(self._pairs):
             for start, end in zip(borders[::2].tolist(), borders[1::2].tolist(), strict=True):
-                self._along(q_rad[start:end], external[start:end], start, found)
-        return found.clearances()
+                self._along(q_rad[start:end], external[start:end], start, nearest)
+        return nearest.clearances()
 
     def apart(self, q_rad: Floats, external: Floats) -> Floats:
         """Return the least gap (n,) at single rows of angles in rad and E1 to E6 (n, 6)."""
@@ -100,12 +100,12 @@ class Turning:
             least = np.minimum(least, (gaps.reshape(len(ends), -1) - self._radius_mm[rows]).min(axis=1))
         return least
 
-    def _along(self, q_rad: Floats, external: Floats, first: int, found: "_Found") -> None:
+    def _along(self, q_rad: Floats, external: Floats, first: int, nearest: "_Found") -> None:
         """Go along rows without a break, of which the first has this number."""
         arm, table, farther = self._gone(q_rad, external)
         ends, away = self._seen(q_rad, external)
         row, (gaps, places) = 0, self._gaps(ends[0])
-        found.tell(first, gaps, places)
+        nearest.tell(first, gaps, places)
         while row < len(q_rad) - 1:
             room = self._room(gaps)
             rows = slice(row + 1, row + 1 + _WINDOW_ROWS)
@@ -117,7 +117,7 @@ class Turning:
             if passed == 0:
                 both = slice(row, row + 2)
                 least, where = self._between(q_rad[both], external[both], gaps, places, used[0])
-                found.tell(first + row + 1, least, where)
+                nearest.tell(first + row + 1, least, where)
             row += max(passed, 1)
             gaps, places = self._gaps(ends[row])
 

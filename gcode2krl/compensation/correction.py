@@ -258,8 +258,8 @@ def _corners(ways: Ways, runs: list[LineRun]) -> Floats:
     """
     target = np.zeros_like(ways.unit)
     for run, after in zip(runs, [*runs[1:], None], strict=False):
-        own = compliance.project_normal(run.value_mm[-1:], ways.unit[run.last])[0]
-        target[run.last] = own
+        shift = compliance.project_normal(run.value_mm[-1:], ways.unit[run.last])[0]
+        target[run.last] = shift
         if after is None or not (after.first == run.last + 1 and ways.follows[after.first]):
             continue
         if run.air_mm[-1] == 0.0 or after.air_mm[0] == 0.0:
@@ -268,10 +268,10 @@ def _corners(ways: Ways, runs: list[LineRun]) -> Floats:
         lines = ways.unit[[run.last, after.first]]
         other = compliance.project_normal(after.value_mm[:1], lines[1])[0]
         across = np.eye(3) - lines[:, :, None] * lines[:, None, :]
-        both = np.linalg.lstsq(across.reshape(6, 3), np.concatenate([own, other]), rcond=1e-2)[0]
+        both = np.linalg.lstsq(across.reshape(6, 3), np.concatenate([shift, other]), rcond=1e-2)[0]
         most = ways.length_mm[[run.last, after.first]].min() / 3.0
         weight = min(1.0, most / max(float(np.abs(lines @ both).max()), 1e-9))
-        target[run.last] = weight * both + (1.0 - weight) * (own + other) / 2.0
+        target[run.last] = weight * both + (1.0 - weight) * (shift + other) / 2.0
     return target
 
 

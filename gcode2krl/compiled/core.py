@@ -69,7 +69,7 @@ def _described(array: NDArray[Any]) -> str:
 FLOATS, INTS, INTS32 = ArrayOf(np.float64), ArrayOf(np.int64), ArrayOf(np.int32)
 BYTES, BOOLS, FLOATS32 = ArrayOf(np.uint8), ArrayOf(np.bool_), ArrayOf(np.float32)
 OUT_FLOATS, OUT_INTS, OUT_INTS32, OUT_BYTES, OUT_BOOLS, OUT_FLOATS32 = (
-    ArrayOf(each.dtype, written=True) for each in (FLOATS, INTS, INTS32, BYTES, BOOLS, FLOATS32)
+    ArrayOf(array.dtype, written=True) for array in (FLOATS, INTS, INTS32, BYTES, BOOLS, FLOATS32)
 )
 
 

@@ -53,8 +53,8 @@ def shaped(name: str, values: ArrayLike, *shape: int) -> Floats:
     """
     array = contiguous(values)
     if array.ndim == len(shape):
-        for found, length in zip(array.shape, shape, strict=True):
-            if found != length and length != -1:
+        for size, length in zip(array.shape, shape, strict=True):
+            if size != length and length != -1:
                 break
         else:
             return array

@@ -76,8 +76,12 @@ def left_out() -> list[tuple[Published, Floats]]:
     """Return each published set with its residuals of log k (6,), predicted from the other robots."""
     sets = published()
     return [
-        (each, each.log_k - predicted(tuple(s for s in sets if s.robot != each.robot), each.class_kgm))
-        for each in sets
+        (
+            published_set,
+            published_set.log_k
+            - predicted(tuple(s for s in sets if s.robot != published_set.robot), published_set.class_kgm),
+        )
+        for published_set in sets
     ]
 
 
@@ -86,11 +90,11 @@ def published() -> tuple[Published, ...]:
     """Return the published sets of the library."""
     return tuple(
         Published(
-            each["robot"],
-            each["payload_kg"] * each["reach_mm"] / MM_PER_M,
-            np.log(np.array(each["k_Nm_rad"], dtype=float)),
+            entry["robot"],
+            entry["payload_kg"] * entry["reach_mm"] / MM_PER_M,
+            np.log(np.array(entry["k_Nm_rad"], dtype=float)),
         )
-        for each in _file()["set"]
+        for entry in _file()["set"]
     )
 
 

@@ -32,8 +32,8 @@ def simulate(inputs: Inputs, applied: Sequence[Applied] = (), *, rotation: bool 
     cut = _cut(inputs, applied)
     cutting = cut if inputs.load_base_N is None else (inputs.load_base_N, inputs.moment_base_Nmm)
     bending = cutting
-    for one in applied:
-        bending = one.effect.load(bending, inputs, one)
+    for at_work in applied:
+        bending = at_work.effect.load(bending, inputs, at_work)
 
     pose = _pose(inputs, applied, q_true, cutting, bending, rotation)
     sensed = _sensed(cut, inputs, applied)
@@ -99,14 +99,14 @@ def _nominal(inputs: Inputs) -> Signals:
 def _joints(inputs: Inputs, applied: Sequence[Applied]) -> tuple[Floats, Floats, Floats]:
     """Return the joints (m, 6) of the motor side, behind the gears, and as they truly are."""
     q_act = inputs.q_cmd_rad
-    for one in applied:
-        q_act = one.effect.servo(q_act, inputs, one)
+    for at_work in applied:
+        q_act = at_work.effect.servo(q_act, inputs, at_work)
     q_load = _measured(q_act, inputs.q_act_rad, inputs.is_act_missing)
-    for one in applied:
-        q_load = one.effect.gear(q_load, inputs, one)
+    for at_work in applied:
+        q_load = at_work.effect.gear(q_load, inputs, at_work)
     q_true = _measured(q_load, inputs.q_load_rad, inputs.is_load_missing)
-    for one in applied:
-        q_true = one.effect.joints(q_true, inputs, one)
+    for at_work in applied:
+        q_true = at_work.effect.joints(q_true, inputs, at_work)
     return q_act, q_load, q_true
 
 
@@ -119,26 +119,26 @@ def _measured(model_rad: Floats, measured_rad: Floats | None, is_missing: Bools)
 
 def _cut(inputs: Inputs, applied: Sequence[Applied]) -> Load:
     cut: Load = (inputs.force_base_N, inputs.moment_base_Nmm)
-    for one in applied:
-        cut = one.effect.cut(cut, inputs, one)
+    for at_work in applied:
+        cut = at_work.effect.cut(cut, inputs, at_work)
     return cut
 
 
 def _sensed(load: Load, inputs: Inputs, applied: Sequence[Applied]) -> Load:
-    for one in applied:
-        load = one.effect.sensor(load, inputs, one)
+    for at_work in applied:
+        load = at_work.effect.sensor(load, inputs, at_work)
     return load
 
 
 def _stated(signals: Signals, applied: Sequence[Applied]) -> Signals:
-    for one in applied:
-        signals = one.effect.instruments(signals, one)
+    for at_work in applied:
+        signals = at_work.effect.instruments(signals, at_work)
     return signals
 
 
 def _planned(inputs: Inputs, applied: Sequence[Applied]) -> Inputs:
-    for one in applied:
-        inputs = inputs if one.planned else one.effect.replan(inputs, one)
+    for at_work in applied:
+        inputs = inputs if at_work.planned else at_work.effect.replan(inputs, at_work)
     return inputs
 
 
@@ -150,31 +150,31 @@ def _pose(
     ``load`` bends the arm, ``cutting`` is the part of it that acts between cutter and part.
     """
     softness, lengths_mm = inputs.softness, inputs.lengths_mm
-    for one in applied:
-        softness = softness if softness is None else one.effect.softness(softness, inputs, one)
-        lengths_mm = one.effect.geometry(lengths_mm, inputs, one)
+    for at_work in applied:
+        softness = softness if softness is None else at_work.effect.softness(softness, inputs, at_work)
+        lengths_mm = at_work.effect.geometry(lengths_mm, inputs, at_work)
     plain_N = inputs.force_base_N if inputs.load_base_N is None else inputs.load_base_N
     plain = load[0] is plain_N and load[1] is inputs.moment_base_Nmm
     if plain and q_true is inputs.joints_rad and softness is inputs.softness:
         deflection = inputs.bent_mm
     else:
         deflection, _ = arm.bend(q_true, *load, softness, inputs.cell, inputs.tool)
-    turns = [one for one in applied if type(one.effect).elastic is not Effect.elastic]
+    turns = [at_work for at_work in applied if type(at_work.effect).elastic is not Effect.elastic]
     if turns:
         torque = arm.torque_Nm(inputs.jacobian, *load)
         angle = np.zeros_like(torque)
-        for one in turns:
-            angle = one.effect.elastic(angle, torque, inputs, one)
+        for at_work in turns:
+            angle = at_work.effect.elastic(angle, torque, inputs, at_work)
         q_true = q_true + angle
     if q_true is inputs.joints_rad and lengths_mm is inputs.lengths_mm:
         tip = inputs.tip_mm
     else:
         tip = inputs.rigid_tip_mm(q_true, lengths_mm)
     tcp = tip + deflection
-    for one in applied:
-        tcp = one.effect.yielding(tcp, cutting, inputs, one)
-    for one in applied:
-        tcp = one.effect.tcp(tcp, deflection, inputs, one)
+    for at_work in applied:
+        tcp = at_work.effect.yielding(tcp, cutting, inputs, at_work)
+    for at_work in applied:
+        tcp = at_work.effect.tcp(tcp, deflection, inputs, at_work)
     signals: dict[str, Any] = {"q_true_rad": q_true, "tcp_base_mm": tcp}
     if rotation:
         signals["tcp_rotation"] = _orientation(inputs, applied, q_true, load, softness)
@@ -187,8 +187,8 @@ def _orientation(
     """Return the true quaternions (m, 4) of the tool frame: arm, bending, then what frames add."""
     _, bent_rad = arm.bend(q_true, *load, softness, inputs.cell, inputs.tool, turned=True)
     turned = rotation_of(bent_rad) @ arm.tool_rotation(q_true, inputs.cell, inputs.tool)
-    for one in applied:
-        turned = one.effect.orientation(turned, inputs, one)
+    for at_work in applied:
+        turned = at_work.effect.orientation(turned, inputs, at_work)
     return fr.quaternion_from_rotation(turned)
 
 

@@ -96,12 +96,7 @@ def of_the_command(make: "Callable[[Inputs], Made]") -> "cached_property[Made]":
     """Return a property that follows from commanded motion and cell alone: runs and links share its value."""
 
     def once(inputs: "Inputs") -> Made:
-        sources = inputs.commanded
-        known = inputs.kept.get(make.__name__)
-        if known is None or any(old is not new for old, new in zip(known[0], sources, strict=True)):
-            known = inputs.kept[make.__name__] = sources, make(inputs)
-        made: Made = known[1]
-        return made
+        return inputs.remembered(make.__name__, make)
 
     return cached_property(wraps(make)(once))
 
@@ -158,6 +153,15 @@ class Inputs:
     def commanded(self) -> Sources:
         """What the commanded motion consists of, and the cell."""
         return self.cell, self.time_s, self.q_cmd_rad, self.position_mm, self.rotation, self.tool
+
+    def remembered(self, name: str, make: "Callable[[Inputs], Made]") -> Made:
+        """Return what follows from the commanded motion alone, made once for all inputs that share it."""
+        sources = self.commanded
+        known = self.kept.get(name)
+        if known is None or any(old is not new for old, new in zip(known[0], sources, strict=True)):
+            known = self.kept[name] = sources, make(self)
+        made: Made = known[1]
+        return made
 
     @of_the_command
     def tool_rotation(self) -> Floats:

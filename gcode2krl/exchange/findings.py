@@ -82,8 +82,14 @@ def findings_block(issues: Iterable[Issue]) -> str:
     if not printed.findings:
         return block("no findings")
     rows = [
-        (each.first.severity, each.first.line or "", each.first.message, each.first.advice(), each.first.code)
-        for each in printed.findings
+        (
+            finding.first.severity,
+            finding.first.line or "",
+            finding.first.message,
+            finding.first.advice(),
+            finding.first.code,
+        )
+        for finding in printed.findings
     ]
     table = text_table(("", "line", "finding", "remedy", "code"), rows)
     return block("findings", table, *map(paragraph, printed.counts()))

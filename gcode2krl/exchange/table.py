@@ -43,7 +43,7 @@ class Table(Frame):
             rows = len(values) if rows < 0 else rows
             wanted = (rows, *spec.metadata["tail"])
             fits = values.ndim == len(wanted) and all(
-                size in (None, found) for size, found in zip(wanted, values.shape, strict=True)
+                size in (None, length) for size, length in zip(wanted, values.shape, strict=True)
             )
             if not fits:
                 raise ValueError(

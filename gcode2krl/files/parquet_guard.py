@@ -217,23 +217,23 @@ def _pages_bytes(stream: BinaryIO, size: int, about: dict[int, Any], name: str) 
     return decoded
 
 
-def _whole(found: dict[int, Any], key: int, default: int | None = None) -> int:
+def _whole(fields: dict[int, Any], key: int, default: int | None = None) -> int:
     """Return a count, which is never below 0."""
-    value = found.get(key, default)
+    value = fields.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise DamagedError("a count is missing or impossible")
     return value
 
 
-def _text(found: dict[int, Any], key: int) -> str:
-    value = found.get(key)
+def _text(fields: dict[int, Any], key: int) -> str:
+    value = fields.get(key)
     if not isinstance(value, bytes):
         raise DamagedError("a name is missing")
     return value.decode("utf-8", "replace")
 
 
-def _list(found: dict[int, Any], key: int) -> list[Any]:
-    value = found.get(key, [])
+def _list(fields: dict[int, Any], key: int) -> list[Any]:
+    value = fields.get(key, [])
     if not isinstance(value, list):
         raise DamagedError("a list is missing")
     return value

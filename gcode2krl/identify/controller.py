@@ -242,8 +242,8 @@ def _around(value: float, half: float) -> Estimate:
     return Estimate(float(value), float(value - half), float(value + half))
 
 
-def _union(own: Estimate, other: Estimate) -> Estimate:
-    return Estimate(own.value, min(own.low, other.low), max(own.high, other.high))
+def _union(first: Estimate, other: Estimate) -> Estimate:
+    return Estimate(first.value, min(first.low, other.low), max(first.high, other.high))
 
 
 def _other(law: Law) -> Law:
@@ -361,8 +361,11 @@ def _noise_at_rest(pieces: list[Piece], resolution: float) -> float:
     squares, freedom = 0.0, 0
     for piece in pieces:
         edge = int(np.argmin(piece.still))
-        for rest in (piece.position_mm[:edge], piece.position_mm[len(piece.still) - 1 :: -1][: _tail(piece)]):
-            inner = rest[: max(0, len(rest) - 2)]  # the last samples may already be moving
+        for standstill in (
+            piece.position_mm[:edge],
+            piece.position_mm[len(piece.still) - 1 :: -1][: _tail(piece)],
+        ):
+            inner = standstill[: max(0, len(standstill) - 2)]  # the last samples may already be moving
             if len(inner) > 1:
                 squares += float(np.sum((inner - inner.mean(axis=0)) ** 2))
                 freedom += inner.size - 3
@@ -416,8 +419,10 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
     d_fitted, half = d, math.inf
     if weight > 1e-9:
         d_fitted = d - float(slope @ residual) / weight
-        left = residual + slope * (d_fitted - d)
-        half = QUANTILE_90 * math.sqrt(float(left @ left) / max(len(left) - 2, 1) / weight)
+        unexplained = residual + slope * (d_fitted - d)
+        half = QUANTILE_90 * math.sqrt(
+            float(unexplained @ unexplained) / max(len(unexplained) - 2, 1) / weight
+        )
     share = float(piece.cos_half[row]) / 2.0
     return CornerFit(
         source_line=int(piece.source_line[row]),

@@ -109,10 +109,10 @@ def fit_force(
     best = int(np.argmin([trial[0] for trial in trials]))
     delay_s = float(delays[best])
     if 0 < best < len(delays) - 1:  # vertex of the parabola through the three best
-        left, middle, right = (trials[best + offset][0] for offset in (-1, 0, 1))
-        bend = left - 2.0 * middle + right
+        lower, middle, upper = (trials[best + offset][0] for offset in (-1, 0, 1))
+        bend = lower - 2.0 * middle + upper
         if bend > 0.0:
-            delay_s += 0.5 * step_s * (left - right) / bend
+            delay_s += 0.5 * step_s * (lower - upper) / bend
     _, rows, design, wanted, solution = _solve(
         time_s, basis_N, measured_s, measured_N, delay_s, zero, steady_only=True
     )
@@ -191,11 +191,11 @@ def _fit_of(
     step_s: float,
 ) -> ForceFit:
     residual = (wanted - design @ solution).reshape(-1, 3)
-    inverse, told, _ = _inverse(design.T @ design)
+    inverse, is_told, _ = _inverse(design.T @ design)
     score = np.einsum("rai,ra->ri", design.reshape(len(rows), 3, 9), residual)
     spread = _long_run(score, max(1, round(_MEMORY_S / max(step_s, 1e-6))))
     covariance = inverse @ spread @ inverse
-    half = np.where(told, QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
+    half = np.where(is_told, QUANTILE_90 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:6]
     fitted = (design @ solution).reshape(-1, 3)
     cut_N = design.reshape(len(rows), 3, 9)[:, :, :6]
     in_cut = np.abs(cut_N).max(axis=(1, 2)) > 0.0
@@ -234,8 +234,8 @@ def _inverse(normal: Floats) -> tuple[Floats, Bools, int]:
     size, axis = np.linalg.eigh(normal / np.outer(scale, scale))
     kept = size > _DEGENERATE * size.max(initial=1.0)
     inverse = (axis[:, kept] / size[kept]) @ axis[:, kept].T / np.outer(scale, scale)
-    told = used & (np.linalg.norm(axis[:, ~kept], axis=1) < 1e-3)
-    return inverse, np.asarray(told), int(np.count_nonzero(kept & (size > 0.0)))
+    is_told = used & (np.linalg.norm(axis[:, ~kept], axis=1) < 1e-3)
+    return inverse, np.asarray(is_told), int(np.count_nonzero(kept & (size > 0.0)))
 
 
 def _conditions(cut_N: Floats) -> Ints:
@@ -243,14 +243,14 @@ def _conditions(cut_N: Floats) -> Ints:
     flat = cut_N.reshape(len(cut_N), -1)
     size = np.linalg.norm(flat, axis=1)
     condition = np.where(size > 0.0, _MOST_CONDITIONS - 1, -1)
-    left = size > 0.0
+    unassigned = size > 0.0
     for number in range(_MOST_CONDITIONS - 1):
-        if not left.any():
+        if not unassigned.any():
             break
-        first = int(np.argmax(left))
-        alike = left & (_apart(flat, flat[first]) <= _SAME)
+        first = int(np.argmax(unassigned))
+        alike = unassigned & (_apart(flat, flat[first]) <= _SAME)
         condition[alike] = number
-        left &= ~alike
+        unassigned &= ~alike
     return condition
 
 
@@ -268,14 +268,14 @@ def _misfit(design: Floats, wanted: Floats, condition: Ints) -> Floats:
     misfit = np.full(int(condition.max(initial=-1)) + 1, np.nan)
     for number in range(len(misfit)):
         rows = np.repeat(condition == number, 3)
-        own, seen = design[rows], wanted[rows]
-        rest = normal - own.T @ own
-        inverse, _, told = _inverse(rest)
-        if told < rank:
+        block, seen = design[rows], wanted[rows]
+        others = normal - block.T @ block
+        inverse, _, rank_of_others = _inverse(others)
+        if rank_of_others < rank:
             continue
-        solution = inverse @ (right - own.T @ seen)
-        error_N = np.mean((seen - own @ solution).reshape(-1, 3), axis=0)
-        force_N = np.mean((own[:, :6] @ solution[:6]).reshape(-1, 3), axis=0)
+        solution = inverse @ (right - block.T @ seen)
+        error_N = np.mean((seen - block @ solution).reshape(-1, 3), axis=0)
+        force_N = np.mean((block[:, :6] @ solution[:6]).reshape(-1, 3), axis=0)
         misfit[number] = np.linalg.norm(error_N) / max(float(np.linalg.norm(force_N)), 1e-9)
     return misfit
 

@@ -243,35 +243,35 @@ def _with_terms(
         )
     added: dict[str, tuple[tuple[float, float, float], ...]] = {}
     left_out, issues = [], []
-    for key, what, unit, rest in (
+    for key, what, unit, residual in (
         ("force_terms_N", "force", "N", force),
         ("moment_terms_Nmm", "moment", "N·mm", moment),
     ):
-        coefficients, error = _fit_terms(terms, rest)
+        coefficients, error = _fit_terms(terms, residual)
         left_out.append(error)
-        helps = error < _rms(rest)
+        helps = error < _rms(residual)
         if helps:
             added[key] = tuple(_three(row) for row in coefficients)
         if helps:
             text = (
-                f"the {what} holds more than weight and offset, {_rms(rest):.3g} {unit} rms (hose pack?): "
-                "the intervals do not cover how much of it counts as weight and offset"
+                f"the {what} holds more than weight and offset, {_rms(residual):.3g} {unit} rms "
+                "(hose pack?): the intervals do not cover how much of it counts as weight and offset"
             )
             issues.append(Issue("note", "remaining-offset", 0, text))
         else:
             text = (
-                f"no remaining {what} fitted: {_rms(rest):.3g} {unit} rms without, {error:.3g} {unit} at "
+                f"no remaining {what} fitted: {_rms(residual):.3g} {unit} rms without, {error:.3g} {unit} at "
                 "readings left out of the fit of its ten terms"
             )
             issues.append(Issue("note", "remaining-offset", 0, text))
     return plain.model_copy(update=added), (left_out[0], left_out[1]), issues
 
 
-def _fit_terms(terms: Floats, rest: Floats) -> tuple[Floats, float]:
+def _fit_terms(terms: Floats, residual: Floats) -> tuple[Floats, float]:
     """Return coefficients (10, 3) and the rms error at readings left out one by one (PRESS)."""
-    coefficients, *_ = np.linalg.lstsq(terms, rest, rcond=None)
+    coefficients, *_ = np.linalg.lstsq(terms, residual, rcond=None)
     leverage = np.einsum("ij,ji->i", terms, np.linalg.pinv(terms))
-    error = (rest - terms @ coefficients) / np.maximum(1.0 - leverage, 1e-6)[:, None]
+    error = (residual - terms @ coefficients) / np.maximum(1.0 - leverage, 1e-6)[:, None]
     return np.asarray(coefficients, dtype=float), _rms(error)
 
 

@@ -69,8 +69,8 @@ class MeasuredTable:
             values[:, column] = read
         return values
 
-    def _number_error(self, index: int, name: str, found: str | None) -> Exception:
-        what = f"{found!r} is not a finite number" if found else "empty"
+    def _number_error(self, index: int, name: str, text: str | None) -> Exception:
+        what = f"{text!r} is not a finite number" if text else "empty"
         return input_error(
             "table-number",
             f"row {index + FIRST_ROW}, column {name}: {what}",

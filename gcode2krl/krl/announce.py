@@ -126,8 +126,10 @@ def _pieces(cuts_mm: Floats, windows: Windows, targets: Targets, cell: Cell) -> 
     ends_mm = np.minimum(cuts_mm - windows.begin_mm[at], windows.end_mm[at] - cuts_mm)
     close_mm = np.minimum(np.diff(cuts_mm, prepend=-np.inf), np.diff(cuts_mm, append=np.inf))
     quarter_mm = np.minimum(ends_mm, close_mm) / 4.0
-    own, before = targets.cdis_mm[row], targets.cdis_mm[np.maximum(row - 1, 0)]
-    cdis_mm = np.where(own > 0, own, np.where(before > 0, before, cell.controller.cdis_mm or _CDIS_MM))
+    at_target, before = targets.cdis_mm[row], targets.cdis_mm[np.maximum(row - 1, 0)]
+    cdis_mm = np.where(
+        at_target > 0, at_target, np.where(before > 0, before, cell.controller.cdis_mm or _CDIS_MM)
+    )
     narrow_mm = np.maximum(np.floor(quarter_mm / _CDIS_STEP_MM) * _CDIS_STEP_MM, _CDIS_STEP_MM)
     return Pieces(row, share, np.minimum(cdis_mm, narrow_mm))
 

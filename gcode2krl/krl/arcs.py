@@ -31,8 +31,8 @@ def unrolled(program: KrlProgram, targets: Targets) -> KrlProgram:
     """
     if not len(program.circ_rows):
         return program
-    rows, poses, own = _rows_of_arcs(program, targets)
-    return _with_rows(program, rows, poses, [targets.cdis_mm[each] for each in own])
+    rows, poses, targets_of = _rows_of_arcs(program, targets)
+    return _with_rows(program, rows, poses, [targets.cdis_mm[each] for each in targets_of])
 
 
 def in_chords(program: KrlProgram) -> KrlProgram:
@@ -75,7 +75,8 @@ def _with_rows(
         return shifted
 
     statements = tuple(
-        each._replace(motion=int(each.motion + before[each.motion])) for each in program.statements
+        statement._replace(motion=int(statement.motion + before[statement.motion]))
+        for statement in program.statements
     )
     return replace(
         program,
@@ -100,18 +101,18 @@ def _rows_of_arcs(program: KrlProgram, targets: Targets) -> tuple[list[int], lis
     """Return the arcs that are unrolled, the places (k, 3) before their ends, and the targets they are of."""
     rows: list[int] = []
     poses: list[Floats] = []
-    own: list[Ints] = []
+    targets_of: list[Ints] = []
     extra = 0
     for row, via in zip(program.circ_rows.tolist(), program.circ_via_mm, strict=True):
         first = row + extra
-        found = _along(program, targets, row, first, via) if 0 < first < len(targets) else None
-        if found is None:
+        places = _along(program, targets, row, first, via) if 0 < first < len(targets) else None
+        if places is None:
             continue
         rows.append(row)
-        poses.append(found)
-        own.append(np.arange(first, first + len(found)))
-        extra += len(found)
-    return rows, poses, own
+        poses.append(places)
+        targets_of.append(np.arange(first, first + len(places)))
+        extra += len(places)
+    return rows, poses, targets_of
 
 
 def _along(program: KrlProgram, targets: Targets, row: int, first: int, via: Floats) -> Floats | None:

@@ -83,10 +83,10 @@ class StatedCell:
                 continue
             self.line = self.line or head.count(b"\n", 0, match.start()) + 1
             for entry in words.split(", "):
-                found = _ENTRY.fullmatch(entry)
-                self.is_malformed |= found is None
-                if found is not None:
-                    self.hashes[found[1]] = found[2]
+                matched = _ENTRY.fullmatch(entry)
+                self.is_malformed |= matched is None
+                if matched is not None:
+                    self.hashes[matched[1]] = matched[2]
         self._said_hash = _options_hash(*said.values())
         self._released = said["findings released by hand"]
 

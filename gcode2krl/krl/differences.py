@@ -198,9 +198,9 @@ def _external_off(program: KrlProgram, targets: Targets, cell: Cell, count: int)
     return _MotionValues(rows, off[rows])
 
 
-def _furthest(found: _MotionValues) -> _MotionValues:
-    order = np.argsort(-np.nan_to_num(found.value, nan=np.inf), kind="stable")[:_MOST_WORST]
-    return _MotionValues(found.row[order], found.value[order])
+def _furthest(wrong: _MotionValues) -> _MotionValues:
+    order = np.argsort(-np.nan_to_num(wrong.value, nan=np.inf), kind="stable")[:_MOST_WORST]
+    return _MotionValues(wrong.row[order], wrong.value[order])
 
 
 def _joined(parts: list[_MotionValues]) -> _MotionValues:
@@ -210,8 +210,8 @@ def _joined(parts: list[_MotionValues]) -> _MotionValues:
 
 
 def _issues(program: KrlProgram, targets: Targets, wrong: list[_MotionValues]) -> Iterator[Issue]:
-    for (code, sentence), found in zip(_CHECKS, wrong, strict=True):
-        for row, amount in list(zip(*found, strict=True))[:MOST_PLACES]:
+    for (code, sentence), values in zip(_CHECKS, wrong, strict=True):
+        for row, amount in list(zip(*values, strict=True))[:MOST_PLACES]:
             gcode = f" (G-code line {targets.source_line[row]})" if targets.source_line[row] else ""
             file = in_file(program, program.file[program.file_of[row]])
             yield Issue("error", code, int(program.line[row]), file + sentence.format(amount) + gcode, REMEDY)

@@ -67,8 +67,8 @@ def require_stated(program: KrlProgram, simplify_mm: float | None) -> None:
     The tolerance is never taken from the program that is to be judged by it.
     """
     main = program.file[0]
-    found = _STATED.search(program.texts[main][:_HEAD_BYTES])
-    stated = found[1].decode("ascii", "replace") if found else None
+    match = _STATED.search(program.texts[main][:_HEAD_BYTES])
+    stated = match[1].decode("ascii", "replace") if match else None
     if stated == (f"{simplify_mm:g}" if simplify_mm is not None else None):
         return
     if stated is None:
@@ -178,10 +178,10 @@ class _Walk:
         for low in range(first, behind, BLOCK_ROWS):
             row = np.arange(low, min(low + BLOCK_ROWS, behind))
             of = np.searchsorted(self.claim, row)
-            own, ends = linked[of], self.claim[of] == row
-            yield from self._feeds(row[own | ends], of[own | ends], ends[own | ends])
-            yield from self._skipped(row[~own & ~ends], of[~own & ~ends])
-            row, of, ends = row[own], of[own], ends[own]
+            follows, ends = linked[of], self.claim[of] == row
+            yield from self._feeds(row[follows | ends], of[follows | ends], ends[follows | ends])
+            yield from self._skipped(row[~follows & ~ends], of[~follows & ~ends])
+            row, of, ends = row[follows], of[follows], ends[follows]
             from_start = self.toolpath.position_mm[row] - start[of]
             along = np.clip(np.einsum("ij,ij->i", from_start, unit[of]), 0.0, length[of])
             off_mm = lengths(from_start - along[:, None] * unit[of])

@@ -76,7 +76,7 @@ def pieces_in(
     row = np.full(len(position_mm), -1, dtype=np.int64)
     share = np.zeros(len(position_mm))
     position, target, start = (
-        np.ascontiguousarray(each) for each in (position_mm, targets.position_mm, start_mm)
+        np.ascontiguousarray(column) for column in (position_mm, targets.position_mm, start_mm)
     )
     _align(position, ptp, cdis_mm, target, targets.ptp, start, limit_mm, row, share)
     more = np.flatnonzero(row >= 0)

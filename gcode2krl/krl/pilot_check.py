@@ -72,8 +72,8 @@ def check_pilot(
     lead_s: float | None = None
     windows = case.windows or windows_of(targets, krc4.build_chain(targets, cell), case.motion, cell)
     if len(program.triggers.motion) == len(knots) + ends > ends and len(windows.row):
-        lead, found = _timing(program, pilot, windows, cell)
-        issues += found
+        lead, late = _timing(program, pilot, windows, cell)
+        issues += late
         lead_s = float(lead.min())
     order = read_order(len(program.ptp), _halts(program), cell)
     active = most_active(order[program.triggers.motion], view(cell))

@@ -333,9 +333,9 @@ class _Reader:
         names: set[str] = set()
         for file in distinct(file_of).tolist():
             data = self.texts[self.names[file]]
-            own = place[file_of == file]
-            for size in distinct(own[:, 1]).tolist():
-                first = own[own[:, 1] == size, 0]
+            places = place[file_of == file]
+            for size in distinct(places[:, 1]).tolist():
+                first = places[places[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
                 names |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
         return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in names}))

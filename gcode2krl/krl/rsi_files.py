@@ -138,11 +138,11 @@ def ethernet_xml(settings: Online, form: Form) -> str:
 def _refuse_index(objects: Iterable[_Object], rsi: RsiVersion) -> None:
     """Raise where an object has an index that this version of RSI does not know."""
     variables, outputs = _HIGHEST_INDEX[rsi]
-    for each in objects:
-        index = next((value for name, _, value, _ in each.parameters if name == "Index"), 0)
-        most = variables if each.kind.startswith("SEN_") else outputs
+    for thing in objects:
+        index = next((value for name, _, value, _ in thing.parameters if name == "Index"), 0)
+        most = variables if thing.kind.startswith("SEN_") else outputs
         if isinstance(index, int) and index > most:
-            sentence = f"{each.kind} of RSI {rsi} has an index up to {most}, the cell asks for {index}"
+            sentence = f"{thing.kind} of RSI {rsi} has an index up to {most}, the cell asks for {index}"
             remedy = "choose a lower number in [pilot] or [online.link]"
             raise RefusedError(Issue("error", "rsi-index", 0, sentence, remedy))
 
@@ -155,13 +155,13 @@ def _signal_flow_xml(objects: Iterable[_Object]) -> str:
         f'<RSIObjects xsi:noNamespaceSchemaLocation="{schema}" '
         'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">',
     ]
-    for one in objects:
-        lines.append(f'<RSIObject ObjType="{one.kind}" ObjTypeID="{one.number}" ObjID="{one.name}">')
-        if one.inputs:
-            wires = (f'<Input InIdx="{i}" OutObjID="{o}" OutIdx="{k}"/>' for i, o, k in one.inputs)
+    for thing in objects:
+        lines.append(f'<RSIObject ObjType="{thing.kind}" ObjTypeID="{thing.number}" ObjID="{thing.name}">')
+        if thing.inputs:
+            wires = (f'<Input InIdx="{i}" OutObjID="{o}" OutIdx="{k}"/>' for i, o, k in thing.inputs)
             lines += ["<Inputs>", *wires, "</Inputs>"]
-        if one.parameters:
-            lines += ["<Parameters>", *(_parameter(*each) for each in one.parameters), "</Parameters>"]
+        if thing.parameters:
+            lines += ["<Parameters>", *(_parameter(*each) for each in thing.parameters), "</Parameters>"]
         lines.append("</RSIObject>")
     return "\n".join([*lines, "</RSIObjects>"]) + "\n"
 
@@ -174,14 +174,14 @@ def _signal_flow_rsix(objects: Iterable[_Object]) -> str:
         f'<RsiContext {schema} xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xmlns="RsiContext">',
         '<RsiObjects xmlns="RsiDriver">',
     ]
-    for each in objects:
-        kind = _RSIX_KIND[each.kind]
-        lines.append(f'<RsiObject ObjTypeId="{each.number}" ObjType="{kind}" ObjId="{each.name}">')
-        if each.inputs:
-            wires = (f'<Input InIdx="{i - 1}" OutObjId="{o}" OutIdx="{k - 1}"/>' for i, o, k in each.inputs)
+    for thing in objects:
+        kind = _RSIX_KIND[thing.kind]
+        lines.append(f'<RsiObject ObjTypeId="{thing.number}" ObjType="{kind}" ObjId="{thing.name}">')
+        if thing.inputs:
+            wires = (f'<Input InIdx="{i - 1}" OutObjId="{o}" OutIdx="{k - 1}"/>' for i, o, k in thing.inputs)
             lines += ["<Inputs>", *wires, "</Inputs>"]
-        if each.parameters:
-            parameters = (_rsix_parameter(each.kind, *parameter) for parameter in each.parameters)
+        if thing.parameters:
+            parameters = (_rsix_parameter(thing.kind, *parameter) for parameter in thing.parameters)
             lines += ["<Parameters>", *parameters, "</Parameters>"]
         lines.append("</RsiObject>")
     return "\n".join([*lines, "</RsiObjects>", "</RsiContext>"]) + "\n"
@@ -190,12 +190,12 @@ def _signal_flow_rsix(objects: Iterable[_Object]) -> str:
 def numbers_to_compare(settings: Online, pilot: Pilot, form: Form, rsi: RsiVersion) -> list[tuple[str, str]]:
     """Return each kind of object with its number, and the numbers of its parameters, as our file has them."""
     rows = {}
-    for each in _objects(settings, pilot, form, ""):
-        numbers = ((name, number) for name, number, _, _ in each.parameters)
+    for thing in _objects(settings, pilot, form, ""):
+        numbers = ((name, number) for name, number, _, _ in thing.parameters)
         if rsi != "3":
-            numbers = ((_RSIX_NAME.get(name, name), _rsix_number(each.kind, name, k)) for name, k in numbers)
-        kind = each.kind if rsi == "3" else _RSIX_KIND[each.kind]
-        rows[f"{kind} {each.number}"] = ", ".join(f"{name} {number}" for name, number in numbers)
+            numbers = ((_RSIX_NAME.get(name, name), _rsix_number(thing.kind, name, k)) for name, k in numbers)
+        kind = thing.kind if rsi == "3" else _RSIX_KIND[thing.kind]
+        rows[f"{kind} {thing.number}"] = ", ".join(f"{name} {number}" for name, number in numbers)
     return list(rows.items())
 
 

@@ -24,8 +24,8 @@ def rsi_name(program: KrlProgram, folder: Path) -> str:
 
     Spelled as beside the program, as a controller does not tell letters by their case.
     """
-    found = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
-    name = next((match[1] for match in found if match and is_file_name(match[1])), "")
+    matches = (_NAME.search(statement.text) for statement in program.statements if _is_ours(statement.text))
+    name = next((match[1] for match in matches if match and is_file_name(match[1])), "")
     files = _beside(folder)
     flows = (files.get(f"{name}{suffix}".casefold()) for suffix in w.SIGNAL_FLOW_SUFFIXES.values())
     spelled = next((flow for flow in flows if flow is not None), None)

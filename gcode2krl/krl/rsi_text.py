@@ -134,14 +134,14 @@ def lost_subprogram(settings: Online, cell: Cell, tool: int) -> str:
 
 def used_variables(cell: Cell, form: Form) -> list[str]:
     """Return notes on the variables and signals of the controller that the files use."""
-    own, link = cell.pilot, cell.online.link
-    pilot = {
-        "index": f"{own.index_variable} number of the knot, {own.hash_variable} checksum, ",
-        "values": f"{own.value_variable}[1..4] next knot, {own.hash_variable} checksum, ",
+    pilot, link = cell.pilot, cell.online.link
+    reads = {
+        "index": f"{pilot.index_variable} number of the knot, {pilot.hash_variable} checksum, ",
+        "values": f"{pilot.value_variable}[1..4] next knot, {pilot.hash_variable} checksum, ",
         "none": "",
     }[form]
     return [
-        f"RSI reads {pilot}$OV_PRO, $OUT[{link.t1_output}] (on in T1)",
+        f"RSI reads {reads}$OV_PRO, $OUT[{link.t1_output}] (on in T1)",
         f"RSI writes $OUT[{link.ready_output}] (on while corrections are made)",
     ]
 

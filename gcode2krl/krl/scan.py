@@ -72,13 +72,13 @@ def scan_krl(text: bytes | NDArray[np.uint8], chunk_bytes: int = CHUNK_BYTES) ->
 
     def scanned(start: int, end: int) -> Ints:
         (lines, first, motion), (_, behind, last_motion) = begins[start], begins[end]
-        rows, own, others = (
+        rows, linear, others = (
             slice(first, behind),
             slice(motion, last_motion),
             slice(first - motion, behind - last_motion),
         )
         counts = np.zeros(4, dtype=np.int64)
-        columns = kinds[rows], blends[rows], line[rows], pose[own], span[others], value[others]
+        columns = kinds[rows], blends[rows], line[rows], pose[linear], span[others], value[others]
         _scan(data, start, end, lines, *columns, counts)
         return counts
 

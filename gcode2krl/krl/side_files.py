@@ -36,9 +36,9 @@ def missing_parts(program: KrlProgram, externals: Iterable[str]) -> list[Issue]:
     there |= {external.split("(")[0].strip().casefold() for external in externals}
     named = ((_PART.match(statement.text), statement.line) for statement in program.declarations)
     return [
-        missing(f"{found[1]}{w.SOURCE_SUFFIX}", "krl-part", line, "the program calls it")
-        for found, line in named
-        if found and found[1].casefold() not in there
+        missing(f"{match[1]}{w.SOURCE_SUFFIX}", "krl-part", line, "the program calls it")
+        for match, line in named
+        if match and match[1].casefold() not in there
     ]
 
 

@@ -247,8 +247,8 @@ def _no_sidecar(program: KrlProgram, path: Path) -> Issue:
 
 def _without_pilot(program: KrlProgram, cell: Cell) -> KrlProgram:
     """Return a program without what it sets and calls for a pilot force whose sidecar is missing."""
-    own = (cell.pilot.index_variable, cell.pilot.hash_variable, f"{cell.pilot.value_variable}[")
-    prefixes = tuple(_normal(name) for name in own)
+    set_names = (cell.pilot.index_variable, cell.pilot.hash_variable, f"{cell.pilot.value_variable}[")
+    prefixes = tuple(_normal(name) for name in set_names)
     statements = tuple(s for s in program.statements if not _normal(s.text).startswith(prefixes))
     uncalled = {
         key: text for key, text in program.uncalled.items() if not key.endswith(f"/{w.PILOT_SUBPROGRAM}")
@@ -293,17 +293,17 @@ def compare(
             for p in (program, intended)
         )
         issues += _statement_issues(read, wished, program)
-        own, wanted = (_own_declarations(p.declarations) for p in (program, intended))
-        issues += _statement_issues(own, wanted, program)
+        declared, wanted = (_own_declarations(p.declarations) for p in (program, intended))
+        issues += _statement_issues(declared, wanted, program)
         issues += _uncalled_issues(program, intended)
     figures: PilotFigures | None = None
     if pilot is not None and paired:
-        figures, found = check_pilot(program, pilot, targets, cell)
-        issues += found
+        figures, more = check_pilot(program, pilot, targets, cell)
+        issues += more
     kept: OriginalFigures | None = None
     if targets.simplified is not None and original is not None and paired:
-        kept, found = compare_with_original(program, targets, original, cell)
-        issues += found
+        kept, more = compare_with_original(program, targets, original, cell)
+        issues += more
     worst = tuple(
         {
             "file": program.file[program.file_of[row]],

@@ -152,15 +152,15 @@ def write_krl(
         of_name += [*online_issues(targets, cell), *retract_issues(targets, cell)]
     joints = robot.ptp_joints(targets, cell) if joints is None else joints
     arcs, splines, about_curves = _curves(targets, cell, pilot, is_online=online is not None)
-    found = [*of_name, *about_curves, *forecast.issues]
-    allow = (*allow, *matching(found, allow_where_found))
-    issues = list(released(found, allow, strict))
+    findings = [*of_name, *about_curves, *forecast.issues]
+    allow = (*allow, *matching(findings, allow_where_found))
+    issues = list(released(findings, allow, strict))
     layout = TextLayout(
         guard,
         split if file is not None else "defs",
         single_file=file is None,
         options=options,
-        allowed=header_words(found, allow),
+        allowed=header_words(findings, allow),
         forces=forecast.has_forces,
         online=online or "",
         collisions=_scope(forecast),

@@ -175,7 +175,7 @@ class CycleInputs:
     """(n, 6) joints of the program, without correction."""
     position_mm: Floats
     """(n, 3) tip of the program in ``$BASE``, without correction."""
-    told: Announced
+    announced: Announced
     """(n,) columns: what the controller reports of the pilot."""
 
     def __len__(self) -> int:
@@ -183,9 +183,9 @@ class CycleInputs:
 
     def rows(self, start: int, end: int) -> "CycleInputs":
         """Return some rows."""
-        told = Announced(*(column[start:end] for column in self.told))
-        own = {f.name: getattr(self, f.name)[start:end] for f in fields(self) if f.name != "told"}
-        return CycleInputs(**own, told=told)
+        announced = Announced(*(column[start:end] for column in self.announced))
+        columns = {f.name: getattr(self, f.name)[start:end] for f in fields(self) if f.name != "announced"}
+        return CycleInputs(**columns, announced=announced)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +306,7 @@ def stream(
     raw = _load_base(device, samples, rotation)
     filter_state, measured, lost = filtered(state.filter, raw, settings)
     gate_state, pilot_N, known, gate = estimate(
-        state.gate, samples.time_s, samples.position_mm, samples.told, device.table, settings
+        state.gate, samples.time_s, samples.position_mm, samples.announced, device.table, settings
     )
     estimate_N = _pilot_base(device, pilot_N, rotation)
     blend_state, blend = blended(state.blend, measured, estimate_N, known, settings)

@@ -72,9 +72,9 @@ def _against(twin: Twin, run: TwinRun) -> Bools:
     carries = deep > _CARRIES * np.maximum(deep.sum(axis=1, keepdims=True), 1e-12)
     against = np.zeros(len(q), dtype=np.bool_)
     for joint in range(q.shape[1]):
-        own, _ = since_reversal(q[:, joint], time_s)
-        whole, _ = since_reversal(q[:, joint] + sent[:, joint], time_s)
-        against |= carries[:, joint] & (own * whole < 0.0)
+        programmed, _ = since_reversal(q[:, joint], time_s)
+        corrected, _ = since_reversal(q[:, joint] + sent[:, joint], time_s)
+        against |= carries[:, joint] & (programmed * corrected < 0.0)
     return against
 
 

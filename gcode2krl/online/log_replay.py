@@ -85,7 +85,7 @@ def replay(
         q_rad=_at(controller, q_rad, time_s),
         q_command_rad=command,
         position_mm=_command_mm(run, command, time_s, cell, tool),
-        told=_announced(run, time_s, knots, header),
+        announced=_announced(run, time_s, knots, header),
     )
     device = build_compensator(
         cell,

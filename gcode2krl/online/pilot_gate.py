@@ -103,7 +103,7 @@ def estimate(
     state: GateState,
     time_s: Floats,
     position_mm: Floats,
-    told: Announced,
+    announced: Announced,
     table: PilotTable,
     settings: Online,
 ) -> tuple[GateState, Floats, Bools, Ints]:
@@ -121,10 +121,10 @@ def estimate(
         _track(
             shaped("time_s", time_s, count),
             shaped("position_mm", position_mm, count, 3),
-            shaped("knot", told.knot, count),
-            shaped("checksum", told.checksum, count),
-            shaped("override_percent", told.override_percent, count),
-            shaped("t1", told.t1, count),
+            shaped("knot", announced.knot, count),
+            shaped("checksum", announced.checksum, count),
+            shaped("override_percent", announced.override_percent, count),
+            shaped("t1", announced.t1, count),
             shaped("time_s", table.time_s, -1),
             shaped("lead_s", table.lead_s, -1),
             shaped("force_N", table.force_N, -1, 3),

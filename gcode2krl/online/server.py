@@ -85,12 +85,12 @@ def serve(
     *,
     force: ForceSource = force_in_telegram,
     stop: threading.Event | None = None,
-    told: Callable[[Session], None] | None = None,
+    on_change: Callable[[Session], None] | None = None,
 ) -> tuple[Session, Statistics]:
     """Answer telegrams until the session is closed or ``stop`` is set; returns how it ended.
 
     Where ``robot_address`` is set, only its datagrams are read. The first well-formed telegram decides who
-    the peer is, address and port. ``told`` is called when the phase changes.
+    the peer is, address and port. ``on_change`` is called when the phase changes.
     """
     stop = stop or threading.Event()
     robot = device.settings.link.robot_address
@@ -110,13 +110,13 @@ def serve(
             before = session
             if received is None:
                 session = silent(session, arrived_s - heard_s, device.settings)
-                _note(before, session, recorder, told)
+                _note(before, session, recorder, on_change)
                 continue
             data, sender = received
             telegram = _parsed(data, sender, peer, robot, statistics)
             if telegram is None:
                 session = silent(session, arrived_s - heard_s, device.settings)
-                _note(before, session, recorder, told)
+                _note(before, session, recorder, on_change)
                 continue
             peer, heard_s = sender, arrived_s
             load = force(telegram)
@@ -127,7 +127,7 @@ def serve(
                 _count(statistics, session, time.monotonic() - arrived_s)
             recorder.telegram(data, text)
             recorder.load(telegram.ipoc, load)
-            _note(before, session, recorder, told)
+            _note(before, session, recorder, on_change)
     finally:
         gc.unfreeze()
         if collects:
@@ -209,7 +209,7 @@ def _count(statistics: Statistics, session: Session, took_s: float) -> None:
 
 
 def _note(
-    before: Session, after: Session, recorder: Recorder, told: Callable[[Session], None] | None
+    before: Session, after: Session, recorder: Recorder, on_change: Callable[[Session], None] | None
 ) -> None:
     changed = (before.phase, before.reason, before.gate, before.lost) != (
         after.phase,
@@ -220,5 +220,5 @@ def _note(
     if changed:
         gate = Gate(after.gate).name.lower()
         recorder.event(after.ipoc, after.phase.value, after.reason, gate, after.lost, after.ignored)
-    if told is not None and (before.phase, before.reason) != (after.phase, after.reason):
-        told(after)
+    if on_change is not None and (before.phase, before.reason) != (after.phase, after.reason):
+        on_change(after)

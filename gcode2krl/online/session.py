@@ -356,5 +356,5 @@ def sample_of(telegram: Telegram, load: Floats) -> CycleInputs:
         q_rad=telegram.q_rad[None],
         q_command_rad=telegram.q_command_rad[None],
         position_mm=telegram.command_mm[None],
-        told=Announced(*(np.array([value]) for value in pilot)),
+        announced=Announced(*(np.array([value]) for value in pilot)),
     )

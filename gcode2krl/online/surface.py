@@ -44,10 +44,10 @@ def surface_of(prediction: Prediction, run: TwinRun, judged: Judged) -> Surface:
     radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
     low, shape = grid_of(motion.position_mm[cuts], radius[cuts])
     nominal = floor_over(motion.position_mm[cuts], radius[cuts], low, shape)
-    left = floor_over((motion.position_mm + run.error_mm)[cuts], radius[cuts], low, shape)
-    cut_by_both = np.isfinite(nominal) & np.isfinite(left)
+    remaining = floor_over((motion.position_mm + run.error_mm)[cuts], radius[cuts], low, shape)
+    cut_by_both = np.isfinite(nominal) & np.isfinite(remaining)
     floor = np.full(nominal.shape, np.nan)
-    floor[cut_by_both] = left[cut_by_both] - nominal[cut_by_both]
+    floor[cut_by_both] = remaining[cut_by_both] - nominal[cut_by_both]
     velocity = np.gradient(motion.position_mm, motion.time_s, axis=0)
     across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)  # to the left of the feed, where phi is 0
     speed = np.linalg.norm(across, axis=1)

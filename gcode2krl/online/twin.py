@@ -241,14 +241,14 @@ def _sensed(twin: Twin, force: Floats, moment: Floats, noise: Floats, time_s: Fl
     return np.stack([np.interp(at, time_s, column) for column in load.T], axis=1)
 
 
-def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, told: Announced) -> CycleInputs:
+def _samples(twin: Twin, time_s: Floats, load: Floats, present: Floats, announced: Announced) -> CycleInputs:
     return CycleInputs(
         time_s=time_s,
         load=load,
         q_rad=present,
         q_command_rad=twin.joints.q_rad,
         position_mm=twin.motion.position_mm,
-        told=told,
+        announced=announced,
     )
 
 

@@ -45,12 +45,12 @@ def _least_moved(at: Floats, low: Floats, high: Floats, knot: Ints) -> Floats:
     rows, knots, gaps = len(at), len(knot), len(knot) - 1
     lines = np.array([np.interp(at, at[knot], row) for row in np.eye(knots)]).T
     steps, span = np.diff(np.eye(knots), axis=0), np.diff(at[knot])[:, None]
-    none, one, off = np.zeros((rows, gaps + 1)), np.ones((rows, 1)), np.zeros((gaps, 1))
+    none, off_way, off = np.zeros((rows, gaps + 1)), np.ones((rows, 1)), np.zeros((gaps, 1))
     bounds = [(None, None)] * knots + [(0.0, None)] * (gaps + 2)  # places, moves, largest slope, way off
     above = np.block(
         [
-            [lines, none, -one],
-            [-lines, none, -one],
+            [lines, none, -off_way],
+            [-lines, none, -off_way],
             [steps, -np.eye(gaps), off, off],
             [-steps, -np.eye(gaps), off, off],
             [np.zeros((gaps, knots)), np.eye(gaps), -span, off],

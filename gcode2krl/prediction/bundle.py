@@ -393,13 +393,13 @@ class Prediction:
         """Return the tables as they are saved: Motion with what stands beside it."""
         tables = {"toolpath": self.toolpath.columns(), "targets": self.targets.columns()}
         if self.motion is not None:
-            beside: list[Table] = [
+            columns_of: list[Table] = [
                 table
                 for table in (self.joints, self.clearance, self.forces, self.deflection)
                 if table is not None
             ]
             tables["motion"] = self.motion.columns()
-            for table in beside:
+            for table in columns_of:
                 tables["motion"] |= table.columns()
             tables["motion"] |= self.added
         return {name: ColumnFrame(columns) for name, columns in tables.items()}

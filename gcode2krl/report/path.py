@@ -50,10 +50,10 @@ def draw_corner(axes: Axes, corner: Corner, targets: Targets, motion: Motion) ->
     before, after = ((targets.position_mm[corner.target + step] - vertex) @ plane for step in (-1, 1))
     half = min(1.35 * corner.reach_mm, 8.0 * corner.distance_mm)
     near = np.flatnonzero(np.linalg.norm(motion.position_mm - vertex, axis=1) <= 3.0 * corner.reach_mm)
-    beside = (
+    is_near = (
         np.abs((motion.position_mm[near] - vertex) @ np.cross(corner.along, corner.across)) <= corner.reach_mm
     )
-    near = near[beside & np.isin(motion.move[near], targets.move[corner.target : corner.target + 2])]
+    near = near[is_near & np.isin(motion.move[near], targets.move[corner.target : corner.target + 2])]
     samples = (motion.position_mm[near] - vertex) @ plane
     axes.plot(*np.stack([before, [0.0, 0.0], after]).T, color=GREY, lw=0.9, zorder=2)
     s = np.linspace(0.0, 1.0, 101)[:, None]
@@ -255,7 +255,7 @@ def _programmed_mm(targets: Targets, motion: Motion) -> Floats:
     return np.insert(points, np.flatnonzero(jump), np.nan, axis=0)
 
 
-def _draw_path(axes: Axes, programmed: Floats, path: Floats, rapid: Bools, told: Bools) -> None:
+def _draw_path(axes: Axes, programmed: Floats, path: Floats, rapid: Bools, is_told: Bools) -> None:
     """Draw one plane view: programmed lines, path, corner samples, start and end."""
     axes.plot(*thin_path(programmed).T, color=GREY, lw=0.7, zorder=2, label="programmed lines")
     into_rapid = rapid & np.append(rapid[1:], True)  # the sample on the border belongs to both
@@ -266,7 +266,7 @@ def _draw_path(axes: Axes, programmed: Floats, path: Floats, rapid: Bools, told:
         if mask.any():
             shown = np.where((mask | (into_rapid != rapid))[:, None], path, np.nan)
             axes.plot(*thin_path(shown).T, color=colour, lw=1.2, zorder=3, label=label)
-    if told.any():
+    if is_told.any():
         label = "samples in corners that can be told apart"
-        axes.plot(*path[told].T, ".", color=ORANGE, ms=2.5, zorder=4, label=label)
+        axes.plot(*path[is_told].T, ".", color=ORANGE, ms=2.5, zorder=4, label=label)
     _mark_ends(axes, path)

@@ -224,10 +224,10 @@ def _way(before: _Before, row: int, cell: Cell) -> Floats:
     return np.asarray(end + np.outer(heights, axis))
 
 
-def _entry_mm(before: _Before, left: HeightField, row: int, end_mm: Floats, cell: Cell) -> float:
+def _entry_mm(before: _Before, remaining: HeightField, row: int, end_mm: Floats, cell: Cell) -> float:
     """Return how far above the start of a row, along the tool axis, the way goes on at feed."""
     tip_mm = before.to_field @ end_mm
-    top_mm = cutting.highest_below(left, tip_mm, cell.tool[_tool(before, row)])
+    top_mm = cutting.highest_below(remaining, tip_mm, cell.tool[_tool(before, row)])
     return max(top_mm - float(tip_mm[2]), 0.0) + ENTRY_MM
 
 

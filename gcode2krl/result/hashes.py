@@ -64,12 +64,12 @@ def _files_below(folder: Path) -> Iterator[Path]:
 def _with_contents(value: Any) -> Any:
     """Return the values of a cell with the hash of each file in the place of its name."""
     if isinstance(value, list):
-        return [_with_contents(each) for each in value]
+        return [_with_contents(entry) for entry in value]
     if not isinstance(value, dict):
         return value
     return {
-        key: _content(each) if key in _FILES_OF_A_CELL and isinstance(each, str) else _with_contents(each)
-        for key, each in value.items()
+        key: _content(entry) if key in _FILES_OF_A_CELL and isinstance(entry, str) else _with_contents(entry)
+        for key, entry in value.items()
     }
 
 

@@ -263,9 +263,9 @@ def _source_lines(program: KrlProgram) -> Ints32:
     """Return the G-code line (p,) that the last comment before each motion names, 0 before the first."""
     lines = np.zeros(len(program.ptp), dtype=np.int32)
     marks = [
-        (file, number, int(found[1]))
+        (file, number, int(match[1]))
         for file, number, text in _comments(program)
-        if (found := _LINE.match(text))
+        if (match := _LINE.match(text))
     ]
     for file in range(len(program.file)):
         own_marks = np.array([(number, line) for at, number, line in marks if at == file]).reshape(-1, 2)
@@ -277,7 +277,7 @@ def _source_lines(program: KrlProgram) -> Ints32:
 
 def _switches(program: KrlProgram) -> Iterator[Switch]:
     """Yield what the M-codes switch, each text once, in the order of the files."""
-    found: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+    switches: dict[tuple[str, tuple[str, ...]], list[int]] = {}
     for name in program.file:
         code, line, texts = "", 0, list[str]()
         for text in [*program.texts[name].decode("ascii", "replace").splitlines(), "END"]:
@@ -287,11 +287,11 @@ def _switches(program: KrlProgram) -> Iterator[Switch]:
                 texts += [text.strip()] if bare and code else []
                 continue
             if code and texts:
-                found.setdefault((code, tuple(texts)), []).append(line)
+                switches.setdefault((code, tuple(texts)), []).append(line)
             code, texts = "", []
             if mark:
                 code, line = f"{mark[2]} {mark[3] or ''}".strip(), int(mark[1] or 0)
-    for (code, statements), lines in found.items():
+    for (code, statements), lines in switches.items():
         yield Switch(code, statements, lines[0], len(lines))
 
 

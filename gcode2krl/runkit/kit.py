@@ -122,10 +122,10 @@ def make_kit(
         place / RUN / "run.toml": run_text(),
     }
     air_file = place / f"{air_name}{w.SOURCE_SUFFIX}"
-    beside = [path.parent / name for name in _names_of(path)]
-    refuse_inputs([*texts, *output_files(air_file, None)], [*inputs, *beside])
+    named_files = [path.parent / name for name in _names_of(path)]
+    refuse_inputs([*texts, *output_files(air_file, None)], [*inputs, *named_files])
     written = write_krl(
-        air, air_file, cell, pilot="none", options=_options(accepted, lift_mm), inputs=[*inputs, *beside]
+        air, air_file, cell, pilot="none", options=_options(accepted, lift_mm), inputs=[*inputs, *named_files]
     )
     tables = air.save(place / PREDICTION, csv=True, inputs=inputs)
     make_folder(place / RUN)

@@ -77,8 +77,8 @@ def check_table(table: Measured, head: RunHead) -> None:
 def check_together(controller: Controller | None, tracker: Tracker | None, force: Force | None) -> None:
     """Raise `NotUnderstoodError` for tables that do not overlap in time, and columns in s and in ms."""
     tables = [table for table in (controller, tracker, force) if table is not None]
-    for one, other in combinations(tables, 2):
-        _check_clocks(one, other)
+    for first, second in combinations(tables, 2):
+        _check_clocks(first, second)
 
 
 def check_columns(controller: Controller | None, tracker: Tracker | None, head: RunHead) -> None:
@@ -170,11 +170,14 @@ def _check_radians(table: Controller) -> None:
             raise _error("trace-unit", words, remedy, table, 0)
 
 
-def _check_clocks(one: Measured, other: Measured) -> None:
-    spans = [float(np.ptp(table.time_s)) for table in (one, other)]
-    first, last = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
-    file = Path(one.source).name
-    long, short = (one, other) if spans[0] > spans[1] else (other, one)
+def _check_clocks(first: Measured, other: Measured) -> None:
+    spans = [float(np.ptp(table.time_s)) for table in (first, other)]
+    first, last = (
+        max(first.time_s[0], other.time_s[0]),
+        min(first.time_s[-1], other.time_s[-1]),
+    )
+    file = Path(first.source).name
+    long, short = (first, other) if spans[0] > spans[1] else (other, first)
     slow = float(np.median(np.diff(long.time_s))) > _LONGEST_FAST_CYCLE_S
     if slow and _SCALED[0] < max(spans) / min(spans) < _SCALED[1]:
         words = (
@@ -185,7 +188,7 @@ def _check_clocks(one: Measured, other: Measured) -> None:
     if first >= last:
         words = (
             f"column {TIME} runs from {other.time_s[0]:.4g} to {other.time_s[-1]:.4g} s, that of {file} from "
-            f"{one.time_s[0]:.4g} to {one.time_s[-1]:.4g} s: they do not overlap"
+            f"{first.time_s[0]:.4g} to {first.time_s[-1]:.4g} s: they do not overlap"
         )
         raise _error("trace-overlap", words, "export one run; [clocks] in run.toml shifts a clock", other, 0)
 

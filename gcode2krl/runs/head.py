@@ -97,6 +97,8 @@ class RunHead(_Table):
     angles: Literal["absolute", "relative"] = "absolute"
     mode: Literal["T1", "T2", "AUT", "EXT"] | None = None
     override_percent: Annotated[float, Field(gt=0, le=200)] = 100.0
+    in_air: bool | None = None
+    """Nothing was cut, so that the prediction counts without its forces; None: the tip tells."""
     frames: RunFrames = RunFrames()
     noise: Noise = Noise()
     channels: Channels = Channels()

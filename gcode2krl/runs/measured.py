@@ -319,8 +319,8 @@ def _incomplete(signal: Signal, absent: Sequence[str], there: set[str], sheet: S
             source=sheet.source,
         )
     if len(absent) < len(signal.columns):
-        rest = ", ".join(column for column in signal.columns if column in there)
-        return missing_column(sheet, absent, f"it belongs with {rest}: give all or none")
+        present = ", ".join(column for column in signal.columns if column in there)
+        return missing_column(sheet, absent, f"it belongs with {present}: give all or none")
     return missing_column(sheet, absent, f"name the columns {', '.join(signal.columns)}")
 
 

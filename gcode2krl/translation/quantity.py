@@ -33,21 +33,21 @@ class Quantity(NamedTuple):
 
 def quantities(loads: LoadFigures | None, time_s: float, targets: Targets, cell: Cell) -> dict[str, Any]:
     """Return ``time_s``, ``max_force_N`` and ``max_deflection_mm`` as plain values; unknown ones are None."""
-    found: dict[str, Quantity | None] = {"time_s": _time(time_s, targets, cell)}
-    found |= {"max_force_N": None, "max_deflection_mm": None}
+    figures: dict[str, Quantity | None] = {"time_s": _time(time_s, targets, cell)}
+    figures |= {"max_force_N": None, "max_deflection_mm": None}
     if loads is not None and cell.material is not None:
-        found["max_force_N"] = _force(loads, cell)
+        figures["max_force_N"] = _force(loads, cell)
         if loads.deflection_mm is not None:
-            found["max_deflection_mm"] = _deflection(loads, loads.deflection_mm, cell)
-    return {name: each._asdict() if each is not None else None for name, each in found.items()}
+            figures["max_deflection_mm"] = _deflection(loads, loads.deflection_mm, cell)
+    return {name: each._asdict() if each is not None else None for name, each in figures.items()}
 
 
-def band_words(found: dict[str, Any]) -> Iterator[str]:
+def band_words(figures: dict[str, Any]) -> Iterator[str]:
     """Yield what the intervals hang on, a quantity each."""
-    force, bent, time = found["max_force_N"], found["max_deflection_mm"], found["time_s"]
-    for name, each in (("force", force), ("deflection", bent)):
-        if each is not None:
-            yield f"{each['share']:.0%} of the band of the {name} is {each['key']}"
+    force, bent, time = figures["max_force_N"], figures["max_deflection_mm"], figures["time_s"]
+    for name, quantity in (("force", force), ("deflection", bent)):
+        if quantity is not None:
+            yield f"{quantity['share']:.0%} of the band of the {name} is {quantity['key']}"
     if time is not None and time["low"] is not None and time["high"] > time["low"]:
         yield f"time {time['low']:.1f}..{time['high']:.1f} s by {time['key']}, unverified"
 

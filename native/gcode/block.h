@@ -53,6 +53,15 @@ enum { OTHER_AXES_COUNT = sizeof OTHER_AXES / sizeof *OTHER_AXES };
 
 enum { NOT_WHOLE = -1 };
 
+static inline double of_tool(Floats diameter_mm, int32_t tool) {
+    return tool >= 0 && tool < diameter_mm.rows ? AT(diameter_mm, tool) : NAN;
+}
+
+/* Return the diameter by which a tool is compensated, NaN where it is not declared. */
+static inline double diameter_of(const Machine *machine, int32_t tool) {
+    return of_tool(machine->tool_diameter_mm, tool);
+}
+
 /* Return the value of a word as a whole number 0…99999, or NOT_WHOLE. */
 static inline int32_t whole(double value) {
     static const double SLACK = 1e-6, LARGEST = 99999.0;

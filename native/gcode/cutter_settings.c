@@ -48,13 +48,6 @@ static void refuse_behind_compensation(Block *b) {
 
 /* --- the diameter --------------------------------------------------------------------------------------- */
 
-static double of_tool(Floats diameter_mm, int32_t tool) {
-    return tool >= 0 && tool < diameter_mm.rows ? AT(diameter_mm, tool) : NAN;
-}
-
-/* Return the diameter by which a tool is compensated, NaN where it is not declared. */
-double diameter_of(const Machine *machine, int32_t tool) { return of_tool(machine->tool_diameter_mm, tool); }
-
 /* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
 static double tool_diameter(Block *b, int32_t code) {
     const int32_t there = tool_in_spindle(b->machine);

@@ -5,7 +5,6 @@
 
 #include "gcode/block.h"
 
-double diameter_of(const Machine *machine, int32_t tool);
 void cutter_compensation(Block *block);
 void refuse_before_compensation(Block *block);
 void refuse_under_compensation(Block *block, int32_t code);

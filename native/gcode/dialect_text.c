@@ -127,22 +127,6 @@ static int64_t dollar_line(Scan *scan, Evaluation *e, int64_t i, int64_t line, b
 
 /* --- statements ----------------------------------------------------------------------------------------- */
 
-/* Return the kind of the statement whose name stands from i to end, -1 for none; names end with their line. */
-int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t end) {
-    int64_t at = 0;
-    for (int64_t k = 0; k < kinds.rows; k++) {
-        int64_t n = 0;
-        while (i + n < end && (AT(text, i + n) & ~(is_letter(AT(text, i + n)) ? CH_CASE_BIT : 0)) == AT(names, at + n))
-            n++;
-        if (i + n == end && AT(names, at + n) == '\n')
-            return AT(kinds, k);
-        while (AT(names, at) != '\n')
-            at++;
-        at++;
-    }
-    return -1;
-}
-
 static int32_t kind_of(const Scan *scan, int64_t i, int64_t end) {
     return statement_kind(scan->text, scan->statement_names, scan->statement_kinds, i, end);
 }

@@ -5,10 +5,6 @@
 
 #include "gcode/parameters.h"
 
-/* Tell whether a character is one of a Sinumerik's names. */
-static inline bool is_of_name(uint8_t c) { return is_letter(c) || is_digit(c) || c == '_'; }
-
-int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t end);
 bool lacks_point(Bytes text, int64_t i);
 int64_t after_skip_level(Bytes text, int64_t i);
 enum { NEEDS_LINE = -1 };

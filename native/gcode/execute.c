@@ -66,7 +66,7 @@ static int64_t marked_line(Run *run, int64_t row, int64_t next) {
         run->course->is_stopped = 1;
         return next;
     }
-    return is_of_macro(marked->kind) ? macro_flow(run, marked, next) : flow(run, marked, next);
+    return is_of_macro(marked->kind) ? macro_flow(run, marked, next) : siemens_flow(run, marked, next);
 }
 
 /* Execute a program from a word on; return the word at which to go on where room or a subprogram is wanted. */

@@ -8,7 +8,6 @@
 #include "gcode/reporting.h"
 #include "gcode/saved_modes.h"
 #include "gcode/settings.h"
-#include "gcode/siemens_flow.h"
 #include "gcode/siemens_values.h"
 
 /* --- the end of a program that cannot go on ------------------------------------------------------------- */
@@ -430,12 +429,6 @@ int64_t flow(Run *run, const MarkedLine *marked, int64_t next) {
     case P_KIND_RETURN: return return_from(run, marked, next);
     case P_KIND_SUB: return define(run, marked, next);
     case P_KIND_END_OF_FILE: return end_of_file(run, next);
-    case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
-    case P_KIND_FOR: return begin_counting(run, marked, next);
-    case P_KIND_ENDFOR: return count_on(run, marked, next);
-    case P_KIND_SECTION: return repeat_section(run, marked, next);
-    case P_KIND_SIEMENS_CALL: return call_by_name(run, marked, next);
-    case P_KIND_CASE: return select_case(run, marked, next);
     case P_KIND_FAULT: return stop_at_fault(run, marked->fault, next);
     }
     return next;

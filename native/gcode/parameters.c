@@ -6,7 +6,6 @@
 #include "gcode/parameters.h"
 
 #include "gcode/block.h"
-#include "gcode/cutter_settings.h"
 #include "gcode/offsets.h"
 
 /* --- numbered ------------------------------------------------------------------------------------------- */

@@ -10,7 +10,7 @@
 #include "gcode/siemens_values.h"
 
 /* IF condition GOTOF label. */
-int64_t siemens_if(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t siemens_if(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression;
     const double test = siemens_value(&e, &i);
@@ -35,12 +35,12 @@ static int64_t pass(Run *run, const MarkedLine *marked, bool first, int64_t insi
 }
 
 /* FOR R1=1 TO 5. */
-int64_t begin_counting(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t begin_counting(Run *run, const MarkedLine *marked, int64_t next) {
     return pass(run, marked, true, next, marked->target);
 }
 
 /* ENDFOR: its expression is that of its FOR. */
-int64_t count_on(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t count_on(Run *run, const MarkedLine *marked, int64_t next) {
     return pass(run, marked, false, marked->target, next);
 }
 
@@ -82,7 +82,7 @@ static void pass_arguments(Evaluation *e, const Subprogram *called, int64_t *i) 
 }
 
 /* NAME(10,R1), NAME P3, L6. */
-int64_t call_by_name(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t call_by_name(Run *run, const MarkedLine *marked, int64_t next) {
     if (!is_ready(run, marked->subprogram))
         return WAIT;
     const Subprogram *called = &AT(run->program->subprograms, marked->subprogram);
@@ -135,7 +135,7 @@ int64_t siemens_block(Run *run, const Words *words, int64_t from, int64_t to, in
 /* --- CASE ----------------------------------------------------------------------------------------------- */
 
 /* CASE R1 OF 1 GOTOF FIRST DEFAULT GOTOF OTHER: its numbers are labels in a segment of its own, DEFAULT is its target. */
-int64_t select_case(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t select_case(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression, number;
     const double value = siemens_value(&e, &i);
@@ -152,7 +152,7 @@ int64_t select_case(Run *run, const MarkedLine *marked, int64_t next) {
 }
 
 /* REPEAT START P=3, REPEATB, REPEAT START STOP: run the lines from the target up to the end so often more. */
-int64_t repeat_section(Run *run, const MarkedLine *marked, int64_t next) {
+static int64_t repeat_section(Run *run, const MarkedLine *marked, int64_t next) {
     Evaluation e = evaluation_of(run->machine, run->program, marked->start, run->line, false);
     int64_t i = marked->expression, times = 1;
     const bool stated = marked->expression > marked->start;
@@ -169,4 +169,17 @@ int64_t repeat_section(Run *run, const MarkedLine *marked, int64_t next) {
     if (!run->course->is_stopped)
         frame_of(run)->until = marked->end;
     return begin;
+}
+
+/* Execute a marked line of a Sinumerik; return the word at which to go on. */
+int64_t siemens_flow(Run *run, const MarkedLine *marked, int64_t next) {
+    switch (marked->kind) {
+    case P_KIND_SIEMENS_IF: return siemens_if(run, marked, next);
+    case P_KIND_FOR: return begin_counting(run, marked, next);
+    case P_KIND_ENDFOR: return count_on(run, marked, next);
+    case P_KIND_SECTION: return repeat_section(run, marked, next);
+    case P_KIND_SIEMENS_CALL: return call_by_name(run, marked, next);
+    case P_KIND_CASE: return select_case(run, marked, next);
+    }
+    return flow(run, marked, next);
 }

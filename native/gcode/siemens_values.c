@@ -6,7 +6,6 @@
 
 #include "gcode/siemens_values.h"
 
-#include "gcode/dialect_text.h"
 #include "gcode/expressions.h"
 #include "gcode/numbers.h"
 
@@ -77,6 +76,22 @@ int64_t assign_r(Evaluation *e, int64_t place, int64_t behind, int64_t value) {
 }
 
 /* --- variables ------------------------------------------------------------------------------------------ */
+
+/* Return the kind of the statement whose name stands from i to end, -1 for none; names end with their line. */
+int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t end) {
+    int64_t at = 0;
+    for (int64_t k = 0; k < kinds.rows; k++) {
+        int64_t n = 0;
+        while (i + n < end && (AT(text, i + n) & ~(is_letter(AT(text, i + n)) ? CH_CASE_BIT : 0)) == AT(names, at + n))
+            n++;
+        if (i + n == end && AT(names, at + n) == '\n')
+            return AT(kinds, k);
+        while (AT(names, at) != '\n')
+            at++;
+        at++;
+    }
+    return -1;
+}
 
 /* Return the number of the R parameter or variable whose name stands at i, and go behind it; -1 for none. */
 static int64_t variable_at(Evaluation *e, int64_t *i) {

@@ -5,6 +5,10 @@
 
 #include "gcode/parameters.h"
 
+/* Tell whether a character is one of a Sinumerik's names. */
+static inline bool is_of_name(uint8_t c) { return is_letter(c) || is_digit(c) || c == '_'; }
+
+int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t end);
 double siemens_value(Evaluation *e, int64_t *i);
 int64_t assign_variable(Evaluation *e, int64_t number, int64_t place, int64_t value);
 int64_t define_variables(Evaluation *e, int64_t i);

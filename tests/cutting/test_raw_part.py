@@ -45,7 +45,7 @@ def test_a_guess_is_marked(toolpath):
 def test_a_mesh_gives_the_field_of_its_upper_side(toolpath, tmp_path, ending):
     solid = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
     solid.export(tmp_path / f"ball.{ending}")
-    cell = resolve_cell({"based_on": "demonstration", "stock": {"mesh": f"ball.{ending}"}}, beside=tmp_path)
+    cell = resolve_cell({"based_on": "demonstration", "stock": {"mesh": f"ball.{ending}"}}, folder=tmp_path)
     field = height_field_of(toolpath, cell, np.eye(3), [TOOL])
     filled = 2.0 / 3.0 * np.pi * 10.0**3 + np.pi * 10.0**3
     assert field.volume_mm3 == pytest.approx(filled, rel=0.005)

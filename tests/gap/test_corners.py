@@ -50,13 +50,13 @@ def test_another_approximation_distance_is_a_sum_of_the_columns(moves):
 
 def test_corners_are_passed_in_order_and_change_nothing_on_straight_lines():
     corners = Corners(_inputs(SAME_SPEED))
-    assert np.all(np.diff(corners.passed, axis=0) >= 0.0)
+    assert np.all(np.diff(corners.passed(np.arange(len(corners.inputs))), axis=0) >= 0.0)
     assert np.mean(np.any(corners.roundings != 0.0, axis=(1, 2))) < 0.5
 
 
 def test_without_targets_there_are_none():
     corners = Corners(replace(_inputs(SAME_SPEED), targets=None))
-    assert corners.passed.shape[1] == 0
+    assert corners.passed(np.arange(3)).shape[1] == 0
     assert not corners.roundings.any()
     assert not corners.late_by_rounding.any()
 

@@ -61,7 +61,7 @@ def samples(cell, seed=1):
     full = np.ones(COUNT)
     told = Announced(knot, 99.0 * full, 100.0 * full, 0.0 * full)
     return CycleInputs(
-        time_s=time_s, load=load, q_rad=q + 1e-4, q_command_rad=q, position_mm=position, told=told
+        time_s=time_s, load=load, q_rad=q + 1e-4, q_command_rad=q, position_mm=position, announced=told
     )
 
 

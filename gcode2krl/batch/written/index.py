@@ -89,8 +89,8 @@ def index_html(records: Iterable[Record], before: Iterable[Record] | None = None
     """
     records = list(records)
     parts = sorted(parts_of(records), key=lambda part: (part.is_written, _natural(part.name)))
-    found = difference(records, before) if before is not None else None
-    changes = _changes(found, parts) if found is not None else {}
+    changed = difference(records, before) if before is not None else None
+    changes = _changes(changed, parts) if changed is not None else {}
     return (
         environment()
         .from_string(_text("index.html.j2"))
@@ -98,9 +98,9 @@ def index_html(records: Iterable[Record], before: Iterable[Record] | None = None
             headline=headline(parts),
             demonstration=demonstration(parts),
             facts=facts(parts),
-            sentence=difference_sentence(found) if found is not None else "",
-            changes=list(difference_rows(found))[:_MOST_CHANGES] if found is not None else [],
-            columns=[column for column in _COLUMNS if column.name != "change" or found is not None],
+            sentence=difference_sentence(changed) if changed is not None else "",
+            changes=list(difference_rows(changed))[:_MOST_CHANGES] if changed is not None else [],
+            columns=[column for column in _COLUMNS if column.name != "change" or changed is not None],
             rows=[_row(part, changes.get(part.name)) for part in parts],
             keys=json.dumps(_keys(parts, changes), separators=(",", ":")),
             width=WIDTH,
@@ -141,8 +141,12 @@ def _keys(parts: Sequence[PartResult], changes: dict[str, "_Changed"]) -> dict[s
 
 def _row(part: PartResult, change: "_Changed | None") -> Row:
     shown = part.reasons() or part.of_severity("warning")
-    told = [(file, finding) for file, one in told_of(shown) for finding in one.findings][:_MOST_FINDINGS]
-    hidden = len(part.of_severity("error", "warning")) - sum(len(finding.issues) for _, finding in told)
+    shown_findings = [(file, finding) for file, one in told_of(shown) for finding in one.findings][
+        :_MOST_FINDINGS
+    ]
+    hidden = len(part.of_severity("error", "warning")) - sum(
+        len(finding.issues) for _, finding in shown_findings
+    )
     return Row(
         name=printable(part.name),
         verdict=part.verdict,
@@ -159,19 +163,19 @@ def _row(part: PartResult, change: "_Changed | None") -> Row:
                 one_line(finding.first.code, _MOST_SENTENCE),
                 one_line(finding.first.advice(), _MOST_SENTENCE),
             )
-            for file, finding in told
+            for file, finding in shown_findings
         ),
         others=f"and {hidden:,} more" if hidden > 0 else "",
     )
 
 
-def _changes(found: Difference, parts: Iterable[PartResult]) -> dict[str, _Changed]:
+def _changes(changed: Difference, parts: Iterable[PartResult]) -> dict[str, _Changed]:
     """Return part → what changed; what is not written any more is the largest change."""
     changes = {part.name: _Changed("the same", 0.0) for part in parts}
-    changes |= {part.name: _Changed("new", None) for part in found.new}
-    changes |= {one.name: _Changed(f"was {one.before.verdict}", _LARGEST) for one in found.refused}
-    changes |= {one.name: _Changed(f"was {one.before.verdict}", -_LARGEST) for one in found.mended}
-    return changes | {one.name: _Changed(_shares(one), one.time_s) for one in found.changed}
+    changes |= {part.name: _Changed("new", None) for part in changed.new}
+    changes |= {one.name: _Changed(f"was {one.before.verdict}", _LARGEST) for one in changed.refused}
+    changes |= {one.name: _Changed(f"was {one.before.verdict}", -_LARGEST) for one in changed.mended}
+    return changes | {one.name: _Changed(_shares(one), one.time_s) for one in changed.changed}
 
 
 def _shares(change: Change) -> str:

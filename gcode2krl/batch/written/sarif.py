@@ -61,8 +61,8 @@ def _sentence(issue: Issue) -> str:
     return printable(f"{issue.message} -> {advice}" if advice else issue.message) or issue.code
 
 
-def _result(found: _Result, rule: int) -> dict[str, Any]:
-    rank, path, line, column, code, sentence = found
+def _result(result: _Result, rule: int) -> dict[str, Any]:
+    rank, path, line, column, code, sentence = result
     place = {"uri": uri(path)} if is_absolute(path) else {"uri": uri(path), "uriBaseId": _BASE}
     region = {"startLine": max(line, 1)}  # GitHub refuses a result without a line
     region |= {"startColumn": column} if line and column else {}

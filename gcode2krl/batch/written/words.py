@@ -97,41 +97,41 @@ def _largest(
     return [Fact(name, words(max(known)[0]), printable(max(known)[1]))] if known else []
 
 
-def difference_sentence(found: Difference) -> str:
+def difference_sentence(changed: Difference) -> str:
     """Return what changed since the last run in one sentence."""
-    if found.is_none:
+    if changed.is_none:
         return "Nothing changed since the last run."
     counts = [
-        (len(found.refused), "not written any more"),
-        (len(found.mended), "written now"),
-        (len(found.gone), "gone"),
-        (len(found.new), "new"),
-        (len(found.changed), "with other figures"),
-        (found.same, "the same"),
+        (len(changed.refused), "not written any more"),
+        (len(changed.mended), "written now"),
+        (len(changed.gone), "gone"),
+        (len(changed.new), "new"),
+        (len(changed.changed), "with other figures"),
+        (changed.same, "the same"),
     ]
     named = ", ".join(f"{count:,} {what}" for count, what in counts if count)
     times = ""
-    if found.changed:
-        whole = _from_to(found.time_before_s, found.time_after_s, time)
+    if changed.changed:
+        whole = _from_to(changed.time_before_s, changed.time_after_s, time)
         times = f" The parts that were written both times take {whole}."
     return f"Since the last run: {named}.{times}"
 
 
-def difference_rows(found: Difference) -> Iterator[DifferenceRow]:
+def difference_rows(changed: Difference) -> Iterator[DifferenceRow]:
     """Yield the parts that changed, those that are not written any more first."""
-    for one in found.refused:
-        yield DifferenceRow(printable(one.name), f"{one.after.verdict}, was written")
-    for one in found.mended:
-        yield DifferenceRow(printable(one.name), f"written, was {one.before.verdict}")
-    yield from (DifferenceRow(printable(part.name), "gone") for part in found.gone)
-    yield from (DifferenceRow(printable(part.name), "new") for part in found.new)
-    yield from map(_changed, found.changed)
+    for change in changed.refused:
+        yield DifferenceRow(printable(change.name), f"{change.after.verdict}, was written")
+    for change in changed.mended:
+        yield DifferenceRow(printable(change.name), f"written, was {change.before.verdict}")
+    yield from (DifferenceRow(printable(part.name), "gone") for part in changed.gone)
+    yield from (DifferenceRow(printable(part.name), "new") for part in changed.new)
+    yield from map(_changed, changed.changed)
 
 
-def _changed(one: Change) -> DifferenceRow:
-    before, after = one.before, one.after
+def _changed(change: Change) -> DifferenceRow:
+    before, after = change.before, change.after
     return DifferenceRow(
-        printable(one.name),
+        printable(change.name),
         "other figures",
         _from_to(before.time_s, after.time_s, time),
         _from_to(before.force_N, after.force_N, force),
@@ -178,8 +178,8 @@ def printable(text: str) -> str:
     return _NOT_PRINTED.sub(_picture, text)
 
 
-def _picture(found: re.Match[str]) -> str:
-    number = ord(found[0])
+def _picture(match: re.Match[str]) -> str:
+    number = ord(match[0])
     return chr(_C0_PICTURES + number) if number < _FIRST_PRINTED else _REPLACEMENT
 
 
@@ -197,5 +197,5 @@ def markdown(text: str) -> str:
     return _IN_MARKDOWN.sub(_references, printable(text))
 
 
-def _references(found: re.Match[str]) -> str:
-    return "".join(" " if character.isspace() else f"&#{ord(character)};" for character in found[0])
+def _references(match: re.Match[str]) -> str:
+    return "".join(" " if character.isspace() else f"&#{ord(character)};" for character in match[0])

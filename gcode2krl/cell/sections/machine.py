@@ -36,8 +36,8 @@ class Machine(Section):
         count = _AXES_OF[self.kind]
         for name in ("axes", "signs"):
             if len(getattr(self, name)) != count:
-                found = len(getattr(self, name))
-                raise ValueError(f"{name} of a {self.kind} machine has {count}, here {found}")
+                stated = len(getattr(self, name))
+                raise ValueError(f"{name} of a {self.kind} machine has {count}, here {stated}")
         if len(set(self.axes)) != count:
             raise ValueError(f"axes names {self.axes[0]} twice")
         return self

@@ -63,8 +63,8 @@ def read_archive(path: Path) -> dict[str, DataList]:
     if not lists:
         sentence = f"no {' and no '.join(WANTED)} in it"
         raise _refused(path, sentence, "archive with File > Archive > USB (KUKA) > All, and name that zip")
-    own = [one for one in entries if PurePosixPath(one.path).name.lower() == VERSION]
-    top = min(own, key=lambda one: one.path.count("/"), default=None)
+    versions = [one for one in entries if PurePosixPath(one.path).name.lower() == VERSION]
+    top = min(versions, key=lambda one: one.path.count("/"), default=None)
     return lists if top is None else {**lists, VERSION: top}
 
 
@@ -326,8 +326,8 @@ def read_controller(path: Path) -> ArchivedController:
     lists = read_archive(path)
     version = lists.pop(VERSION, None)
     values: dict[str, Value] = {}
-    for one in lists.values():
-        values |= krl_values(one.text)
+    for data_list in lists.values():
+        values |= krl_values(data_list.text)
     stated = _KSS.search(version.text) if version is not None else None
     return replace(controller_of(values, path.name or str(path)), kss=stated[1] if stated else "")
 

@@ -97,11 +97,11 @@ def _robots(controller: ArchivedController) -> list[Choice]:
     listed = [(name, "") for name in robots_of_lengths(controller.lengths_mm)]
     where = "those of the file" if controller.is_description else "those of the archive"
     whose = where if controller.lengths_mm else "from its data sheet, with a picture"
-    own = [
+    unlisted = [
         (OTHER, f"not in this list: lengths and limits, {whose}"),
         (FILE, "a robot file of yours, my.toml"),
     ]
-    return [*listed, *own]
+    return [*listed, *unlisted]
 
 
 def _robot(controller: ArchivedController, answers: Answers) -> str | None:

@@ -86,16 +86,16 @@ def read_arm(file: Path) -> DescribedArm:
     turning = [joint for joint, _ in chain if joint.turns]
     limits = [joint.limits for joint in turning]
     speeds = [joint.speed for joint in turning]
-    own = None
+    limits_deg = None
     if all(limit is not None for limit in limits):
         degrees = [
             sorted(sign * math.degrees(end) + offset for end in limit or ())
             for limit, sign, offset in zip(limits, signs, offsets, strict=True)
         ]
-        own = tuple((round(low, 3) + 0.0, round(high, 3) + 0.0) for low, high in degrees)
+        limits_deg = tuple((round(low, 3) + 0.0, round(high, 3) + 0.0) for low, high in degrees)
     known = [round(math.degrees(speed), 3) for speed in speeds if speed]
     return DescribedArm(
-        root.get("name") or file.stem, lengths, own, tuple(known) if len(known) == 6 else None
+        root.get("name") or file.stem, lengths, limits_deg, tuple(known) if len(known) == 6 else None
     )
 
 

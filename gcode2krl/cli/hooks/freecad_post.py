@@ -87,9 +87,9 @@ def export(objectslist, filename, argstring):
 def job_of(objectslist):
     """Return the job that operations belong to."""
     for thing in objectslist:
-        for one in [thing, *getattr(thing, "InListRecursive", [])]:
-            if hasattr(one, "Operations") and hasattr(one, "Stock"):
-                return one
+        for candidate in [thing, *getattr(thing, "InListRecursive", [])]:
+            if hasattr(candidate, "Operations") and hasattr(candidate, "Stock"):
+                return candidate
     raise PostFailedError("gcode2krl: select a job, or operations of one")
 
 

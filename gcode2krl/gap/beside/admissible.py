@@ -156,11 +156,11 @@ class Admissible:
     @cached_property
     def corners_passed(self) -> Floats:
         """(n, c) 1 from each blended corner on."""
-        return self._corners.passed[self._nearest]
+        return self._corners.passed(self._nearest)
 
     @cached_property
     def _corners(self) -> Corners:
-        return Corners(self.trace.inputs)
+        return self.trace.inputs.remembered("corners", Corners)
 
     # Joints
 

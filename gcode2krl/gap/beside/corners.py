@@ -29,8 +29,9 @@ _AT_REST = 0.01
 def rows_of_passing(path_mm: Floats, points_mm: Floats) -> Ints:
     """Return the samples of a path (m, 3) nearest to points (c, 3) that are passed one after the other."""
     rows, first = [], 0
-    for point in points_mm:
-        away = np.linalg.norm(path_mm[first:] - point, axis=1)
+    x, y, z = np.ascontiguousarray(path_mm.T)
+    for at_x, at_y, at_z in points_mm:
+        away = np.sqrt((x[first:] - at_x) ** 2 + (y[first:] - at_y) ** 2 + (z[first:] - at_z) ** 2)
         # the first local minimum that is as near as any: a path may come by again
         near = np.flatnonzero(away < away.min() + _LIMITS.corner_near_mm)
         breaks = np.flatnonzero(np.diff(near) > 1)
@@ -60,10 +61,10 @@ class Corners:
             return np.zeros(0, dtype=np.int64)
         return rows_of_passing(self.inputs.position_mm, targets.position_mm[self._blended])
 
-    @cached_property
-    def passed(self) -> Floats:
-        """(m, c) 1 from each blended corner on."""
-        return self._from(self._rows)
+    def passed(self, samples: Ints) -> Floats:
+        """Return for some samples (n,) 1 from each blended corner on, (n, c)."""
+        steps: Floats = (samples[:, None] >= self._rows).astype(np.float64)
+        return steps
 
     @cached_property
     def roundings(self) -> Floats:
@@ -86,8 +87,8 @@ class Corners:
         nearest = np.where(gone - at_mm[before] <= at_mm[after] - gone, before, after)
         away_mm = np.abs(gone - at_mm[nearest])[:, None]
         hats = np.maximum(0.0, 1.0 - away_mm / np.array(_WIDTHS_MM))
-        found: Floats = hats[:, :, None] * turn[nearest][:, None, :]
-        return found
+        bent: Floats = hats[:, :, None] * turn[nearest][:, None, :]
+        return bent
 
     @cached_property
     def late_by_rounding(self) -> Floats:
@@ -97,7 +98,9 @@ class Corners:
             return np.zeros((len(self.inputs), 2))
         slowness = 1.0 / np.maximum(targets.speed_mm_s, 1e-6)
         change = np.abs(np.diff(slowness, append=slowness[-1:]))[self._blended]
-        return np.stack([self.passed @ change, self.passed.sum(axis=1)], axis=1)
+        late = np.append(0.0, np.cumsum(change))
+        passed = np.searchsorted(self._rows, np.arange(len(self.inputs)), side="right")
+        return np.stack([late[passed], passed.astype(np.float64)], axis=1)
 
     @cached_property
     def late_by_ramps(self) -> Floats:
@@ -108,8 +111,3 @@ class Corners:
         rests = speed < _AT_REST * float(speed.max(initial=0.0))
         stops = np.cumsum(np.diff(rests.astype(np.float64), prepend=0.0) > 0.0).astype(np.float64)
         return np.stack([gained, stops, gradient(speed[:, None], inputs.time_s)[:, 0], speed], axis=1)
-
-    def _from(self, rows: Ints) -> Floats:
-        """Return 1 (m, c) from some samples (c,) on."""
-        steps: Floats = (np.arange(len(self.inputs))[:, None] >= rows[None, :]).astype(np.float64)
-        return steps

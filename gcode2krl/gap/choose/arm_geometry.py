@@ -40,14 +40,12 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmG
     """Return the geometry of the arm that explains runs of poses; None where it brings less than a fifth.
 
     ``left``: share of the gap's rms that causes which were found already leave. None too where a frame and a
-    tool alone do as well, where they are most of the gap (effects of their own are for these), where the
-    robot is not known, or with fewer poses than `THRESHOLDS.fit` states.
+    tool alone do as well, where they are most of the gap (effects of their own are for these), or where
+    the robot is not known. Numbers that few poses do not tell are held by makers' tolerances.
     """
     if not all(_can_be_fitted(pair) for pair in pairs):
         return None
     tables = [_poses(pair) for pair in pairs]
-    if sum(len(table) for table in tables[:explaining]) < _LIMITS.poses_least_geometry:
-        return None
     options = Options(groups=GEOMETRY)
     arm = arm_of(pairs[0].inputs.cell)
     read = _readings(tables[:explaining])

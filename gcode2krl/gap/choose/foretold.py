@@ -152,7 +152,7 @@ def _functions(
             columns = _lifted(place, list(_at(evidence, traces, place)))
             yield columns, np.eye(columns[0].shape[2])
         return
-    for family in grid.families():
+    for family in grid.families(evidence.on):
         if family.on is evidence.on and family.place.name == evidence.place.name:
             yield from ((list(family.columns), root) for root in family.roots)
 

@@ -25,7 +25,8 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 _LIMITS = THRESHOLDS.families
 _WARMS_H = (0.1, 0.3, 1.0, 3.0)
 """Time constants over which a cell drifts between runs."""
-
+_OF_THE_PLAN = (Dependence.CORNERS, Dependence.VELOCITY, Dependence.STOPS)
+"""What laws of a controller for corners, speeds and stops depend on."""
 
 TIMING = "timing"
 """The place of what is late along the path."""
@@ -138,17 +139,17 @@ class Grid:
             if scale > 0.0:
                 yield Place(f"A{joint + 1}", Where.JOINT, tuple(each / scale for each in lifted), joint)
 
-    def families(self) -> Iterator[Family]:
-        """Yield every family that is no step and no tone."""
+    def families(self, on: Dependence | None = None) -> Iterator[Family]:
+        """Yield every family that is no step and no tone; those on one input where it is stated."""
         for place in self.places:
-            for on, functions in self._functions(place):
-                if functions.width:
-                    yield Family(place, on, *place.lifted(functions), directions=place.width)
+            for of, functions in self._functions(place):
+                if functions.width and on in (None, of):
+                    yield Family(place, of, *place.lifted(functions), directions=place.width)
             if place.width > 1 and place.where is Where.TIP:
                 yield from self._of_the_pose(place)
             elif place.width > 1:
                 yield from self._of_the_signal(place)
-        if self.traces[0].link.tells_time:
+        if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN):
             yield from self._of_the_plan(self._timing)
 
     # Functions at a place

@@ -12,6 +12,7 @@ from gcode2krl.errors import Issue
 from gcode2krl.gap.beside.clocks import with_coarse_clocks
 from gcode2krl.gap.beside.context import Context
 from gcode2krl.gap.beside.pair import Pair
+from gcode2krl.gap.slips.air import without_cuts
 from gcode2krl.gap.slips.checks import CheckTest, checked
 from gcode2krl.gap.slips.clock import ClockTest
 from gcode2krl.gap.slips.force_unit import ForceUnitTest
@@ -54,8 +55,9 @@ def examine_set_up(context: Context) -> SetUp:
     stops, stopped = unplanned_stops(context.pairs, context.offered)
     if stops:
         return SetUp(replace(context.with_pairs(stopped), stopped=True), stops, [])
-    context = context.with_pairs(with_coarse_clocks(pair) for pair in context.pairs)
-    issues = checked(context.pairs)
+    pairs, in_air = without_cuts(with_coarse_clocks(pair) for pair in context.pairs)
+    context = context.with_pairs(pairs)
+    issues = [*in_air, *checked(context.pairs)]
     slips = first_slip(context.pairs, context.offered, issues)
     clocks = ClockTest().find(context.pairs, context.offered)
     if not any(slip.final for slip in slips):

@@ -44,6 +44,6 @@ def apply_to_cell(gap: Gap, file: Path, base: Path | None, sources: Sequence[str
     replaced = {(entry["name"], entry.get("target")) for entry in entries}
     kept = [entry for entry in before if (entry.get("name"), entry.get("target")) not in replaced]
     data["effects"] = [*kept, *entries]
-    resolve_cell(data, beside=file.parent, source=str(file))
+    resolve_cell(data, folder=file.parent, source=str(file))
     write_together({file: tomli_w.dumps(data).encode("utf-8")})
     return len(entries)

@@ -26,7 +26,6 @@ class FitThresholds:
     )
 
     poses_least_again: int = convention(8, "readings of poses visited again from which they tell the noise")
-    poses_least_geometry: int = convention(40, "poses from which the arm's own geometry is fitted to them")
     poses_mostly_frames: float = convention(
         3.0, "a gap of poses this many times the arm's own errors is one of base and tool, which are effects"
     )

@@ -43,6 +43,12 @@ class SlipThresholds:
     still_mm_s: float = convention(1.0, "a tip that moves slower is at rest")
     motion_step_s: float = convention(0.1, "speeds are taken over so long: no noise of encoders")
 
+    air_share: float = convention(
+        0.3,
+        "of the tip's error beside the predicted deflection, in each quarter of the cut: where less is left "
+        "without it, nothing was cut; an arm of twice the stiffness leaves as much either way",
+    )
+
     force_unit_log: float = calibrated(
         0.15, DEVELOPMENT, "a factor is that of a unit where its logarithm is so near"
     )

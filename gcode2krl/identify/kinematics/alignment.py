@@ -86,10 +86,10 @@ def _alignment(
 ) -> Alignment:
     """Return the frames with a true rotation, then place and targets for it."""
     free = solution[:9].reshape(3, 3)
-    left, sizes, right = np.linalg.svd(free)
+    u, sizes, vt = np.linalg.svd(free)
     scale = float(sizes.mean())
-    is_mirrored = bool(np.linalg.det(left @ right) < 0.0)
-    turn = right.T @ np.diag([1.0, 1.0, -1.0 if is_mirrored else 1.0]) @ left.T
+    is_mirrored = bool(np.linalg.det(u @ vt) < 0.0)
+    turn = vt.T @ np.diag([1.0, 1.0, -1.0 if is_mirrored else 1.0]) @ u.T
     targets = int(target.max(initial=0)) + 1
     design = np.zeros((len(measured), 3, 3 + 3 * targets))
     design[:, range(3), range(3)] = 1.0
@@ -97,6 +97,6 @@ def _alignment(
         rows = target == number
         design[rows, :, 3 + 3 * number : 6 + 3 * number] = turn @ rotation[rows]
     wanted = measured - flange @ turn.T
-    found = _solved(design[kept], wanted[kept])
-    off = float(np.median(_off(design, wanted, found)))
-    return Alignment(found[:3], turn, found[3:].reshape(-1, 3), scale, is_mirrored, off)
+    shifts = _solved(design[kept], wanted[kept])
+    off = float(np.median(_off(design, wanted, shifts)))
+    return Alignment(shifts[:3], turn, shifts[3:].reshape(-1, 3), scale, is_mirrored, off)

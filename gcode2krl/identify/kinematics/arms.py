@@ -36,9 +36,9 @@ class Arm:
 
     def kuka_rad(self, q_rad: Floats) -> Floats:
         """Return the joints (n, 6) in KUKA's signs and zero, from those of the arm's own controller."""
-        own = q_rad.copy()
-        own[:, 2] += self.a3_by_a2 * own[:, 1]
-        paper = self.signs * own - self.offsets_rad
+        q = q_rad.copy()
+        q[:, 2] += self.a3_by_a2 * q[:, 1]
+        paper = self.signs * q - self.offsets_rad
         return np.asarray(np.array(_KUKA_SIGNS) * paper + RAD_PER_DEG * np.array(_KUKA_OFFSETS_DEG))
 
 
@@ -84,10 +84,10 @@ def arm_named(model: str) -> Arm:
 
 def all_arms() -> dict[str, Arm]:
     """Return model → arm of every maker."""
-    found = dict(_listed())
+    arms = dict(_listed())
     for model in library.names("robots"):
         geometry = library.read_model("robots", model).get("geometry", {})
         if "a1_mm" in geometry:
             mm = [0.0 if name in ("b", "d5") else float(geometry[f"{name}_mm"]) for name in LENGTHS]
-            found[model] = _kuka(model, np.array(mm))
-    return found
+            arms[model] = _kuka(model, np.array(mm))
+    return arms

@@ -27,9 +27,9 @@ def section_of(readings: Readings, arm: Arm, options: Options) -> tuple[list[dic
     Raises as `identify_kinematics` does.
     """
     groups = ("zeros", "lengths", "axes", *(g for g in ("drift", "air") if g in options.groups))
-    found = identify_kinematics(readings, arm, replace(options, groups=groups, only=_EFFECTS))
+    fit = identify_kinematics(readings, arm, replace(options, groups=groups, only=_EFFECTS))
     entries = []
-    for part in found.parts:
+    for part in fit.parts:
         if part.name in _EFFECTS and part.is_told and not part.estimate.contains(0.0):
             effect, target, parameter, sign = _EFFECTS[part.name]
             value = float(f"{sign * part.estimate.value:.6g}")
@@ -41,4 +41,4 @@ def section_of(readings: Readings, arm: Arm, options: Options) -> tuple[list[dic
                     "source": f"identify kinematics, {readings.source}: {len(readings)} poses",
                 }
             )
-    return entries, found
+    return entries, fit

@@ -58,10 +58,10 @@ class Chain:
             axis = columns[motion.axis]
             acts[name] = (axis, place)
             if motion.turns:
-                one, two = (motion.axis + 1) % 3, (motion.axis + 2) % 3
+                i, j = (motion.axis + 1) % 3, (motion.axis + 2) % 3
                 cos, sin = np.cos(value), np.sin(value)
-                first, second = columns[one], columns[two]
-                columns[one], columns[two] = cos * first + sin * second, cos * second - sin * first
+                first, second = columns[i], columns[j]
+                columns[i], columns[j] = cos * first + sin * second, cos * second - sin * first
             else:
                 place = place + value * axis
         return place, np.stack(columns, axis=2), acts

@@ -127,8 +127,10 @@ class _Fitting:
             sigma = self._noise(rows, sigma)[0]
         sigma, freedom, covariance, slopes = self._noise(rows, sigma)
         variance = np.diag(covariance) / self._steps**2
-        told = 1.0 / variance - self._precision
-        by_rows = np.where(told > 1e-3 / variance, self._steps / np.sqrt(np.maximum(told, 1e-300)), np.inf)
+        precision = 1.0 / variance - self._precision
+        by_rows = np.where(
+            precision > 1e-3 / variance, self._steps / np.sqrt(np.maximum(precision, 1e-300)), np.inf
+        )
         return Fit(self._u * self._steps, sigma, covariance, by_rows, all_rows & ~rows, slopes, freedom)
 
     def _widen(self, covariance: Floats) -> None:
@@ -152,10 +154,10 @@ class _Fitting:
         inverse = np.linalg.inv(
             normal + sigma**2 * np.diag(self._precision) + 1e-9 * np.diag(np.diag(normal))
         )
-        told = float(np.trace(inverse @ normal))
-        freedom = max(len(flat) - told, 1.0)
-        left = self.off()[rows]
-        sigma = max(float(np.sqrt(np.sum(left**2) / freedom)), _LEAST_SIGMA_MM)
+        spent = float(np.trace(inverse @ normal))
+        freedom = max(len(flat) - spent, 1.0)
+        residual = self.off()[rows]
+        sigma = max(float(np.sqrt(np.sum(residual**2) / freedom)), _LEAST_SIGMA_MM)
         covariance = sigma**2 * inverse * np.outer(self._steps, self._steps)
         return sigma, freedom, covariance, flat
 
@@ -172,7 +174,7 @@ class _Fitting:
             flat = slopes[rows].reshape(-1, len(u)) * (self._steps / sigma)
             return np.concatenate([flat, np.diag(weight)])
 
-        found = least_squares(
+        solution = least_squares(
             residual,
             self._u,
             jac=jacobian,
@@ -183,4 +185,4 @@ class _Fitting:
             gtol=1e-8,
             max_nfev=30,
         )
-        self._u = np.asarray(found.x)
+        self._u = np.asarray(solution.x)

@@ -179,11 +179,11 @@ def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options
     )
 
 
-def tips_of(found: Geometry, readings: Readings, arm: Arm, options: Options) -> Floats:
+def tips_of(geometry: Geometry, readings: Readings, arm: Arm, options: Options) -> Floats:
     """Return where the instrument should see the tips (n, 3) of other poses of an arm, in rad and mm."""
     poses, _ = _poses(readings, arm.kuka_rad(readings.q_rad), arm, options)
-    model = _model(poses, arm, found.alignment, options, tuple(options.groups))
-    values = {part.name: part.estimate.value for part in found.parts}
+    model = _model(poses, arm, geometry.alignment, options, tuple(options.groups))
+    values = {part.name: part.estimate.value for part in geometry.parts}
     return model.tips(np.array([values.get(number.name, 0.0) / number.size for number in model.numbers]))
 
 
@@ -200,34 +200,33 @@ def settled(readings: Readings, arm: Arm) -> tuple[Readings, Alignment]:
         q = readings.q_rad * (RAD_PER_DEG if unit == "deg" and not readings.angle_unit else 1.0)
         flange, rotation = flange_of(arm.kuka_rad(q), arm.mm)
         of_pose = np.repeat(np.arange(len(q)), readings.measured.shape[1])[is_seen]
-        found = aligned(points[is_seen], target[is_seen], flange[of_pose], rotation[of_pose])
+        alignment = aligned(points[is_seen], target[is_seen], flange[of_pose], rotation[of_pose])
         size = 1.0
-        if not readings.length_unit and found.scale > np.sqrt(MM_PER_M):
+        if not readings.length_unit and alignment.scale > np.sqrt(MM_PER_M):
             size = MM_PER_M
-            found = aligned(points[is_seen] * size, target[is_seen], flange[of_pose], rotation[of_pose])
-        tries.append((found.off_mm, unit, q, size, found))
+            alignment = aligned(points[is_seen] * size, target[is_seen], flange[of_pose], rotation[of_pose])
+        tries.append((alignment.off_mm, unit, q, size, alignment))
     tries.sort(key=lambda one: one[0])
-    off_mm, unit, q, size, found = tries[0]
+    off_mm, unit, q, size, alignment = tries[0]
     reach_mm = float(arm.mm[[0, 4, 5, 6]].sum())
-    if not (0.97 < found.scale < 1.03) or found.is_mirrored or off_mm > _STRANGE * reach_mm:
-        raise RefusedError(_strange(readings, arm, found), readings.source)
+    if not (0.97 < alignment.scale < 1.03) or alignment.is_mirrored or off_mm > _STRANGE * reach_mm:
+        raise RefusedError(_strange(readings, arm, alignment), readings.source)
     if len(tries) > 1 and tries[1][0] < 3.0 * off_mm:
         words = "the joints are in deg or in rad: both fit"
         raise input_error("run-layout", words, "--unit angle=deg|rad", source=readings.source)
     return replace(
         readings, q_rad=q, measured=readings.measured * size, angle_unit=unit, length_unit="mm"
-    ), found
+    ), alignment
 
 
-def _strange(readings: Readings, arm: Arm, found: Alignment) -> Issue:
+def _strange(readings: Readings, arm: Arm, alignment: Alignment) -> Issue:
     """Say what does not fit, and which arm would."""
-    words = (
-        f"not the poses of {arm.model}: points are {found.off_mm:.0f} mm off (median) with any base and tool"
-    )
-    if found.is_mirrored:
+    off_mm = f"{alignment.off_mm:.0f} mm"
+    words = f"not the poses of {arm.model}: points are {off_mm} off (median) with any base and tool"
+    if alignment.is_mirrored:
         words = f"not the poses of {arm.model}: the points are mirrored, as by a joint's wrong sign"
-    elif not 0.97 < found.scale < 1.03:
-        times = 1.0 / max(found.scale, 1e-9)
+    elif not 0.97 < alignment.scale < 1.03:
+        times = 1.0 / max(alignment.scale, 1e-9)
         words = f"not the poses of {arm.model}: the points are {times:.3g} times as far apart"
     return Issue(
         "error", "kinematics-strange", 0, words, f"{_which_fits(readings)}; --unit, --columns, --robot"
@@ -243,9 +242,9 @@ def _which_fits(readings: Readings) -> str:
     for name, arm in all_arms().items():
         for size in (1.0, RAD_PER_DEG) if not readings.angle_unit else (1.0,):
             flange, rotation = flange_of(arm.kuka_rad(readings.q_rad * size), arm.mm)
-            found = aligned(points[is_seen], target[is_seen], flange[is_seen], rotation[is_seen])
-            if found.off_mm < best[1] and not found.is_mirrored and 0.97 < found.scale < 1.03:
-                best = (name, found.off_mm)
+            alignment = aligned(points[is_seen], target[is_seen], flange[is_seen], rotation[is_seen])
+            if alignment.off_mm < best[1] and not alignment.is_mirrored and 0.97 < alignment.scale < 1.03:
+                best = (name, alignment.off_mm)
     return f"{best[0]} would be {best[1]:.1f} mm off" if best[1] < 20.0 else "no arm that is known fits"
 
 
@@ -335,15 +334,15 @@ def _shared(fit: Fit, steps: Floats) -> Floats:
 
 def _partners(at: int, shares: Floats, groups: np.ndarray) -> list[str]:
     """Return up to two other groups that can do what one number does, the better one first."""
-    found = []
+    partners = []
     for group in dict.fromkeys(groups):
         others = np.flatnonzero((groups == group) & (np.arange(len(groups)) != at))
         if len(others):
             inner = shares[np.ix_(others, others)] + 1e-9 * np.eye(len(others))
             r2 = float(shares[at, others] @ np.linalg.solve(inner, shares[others, at]))
-            found.append((r2, group))
-    found.sort(reverse=True)
-    return [group for r2, group in found[:2] if r2 > _ALIKE**2]
+            partners.append((r2, group))
+    partners.sort(reverse=True)
+    return [group for r2, group in partners[:2] if r2 > _ALIKE**2]
 
 
 def _alike(model: Model, fit: Fit) -> list[tuple[str, str, float]]:
@@ -355,19 +354,19 @@ def _alike(model: Model, fit: Fit) -> list[tuple[str, str, float]]:
         columns = fit.slopes[:, groups == group]
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
         bases[group] = np.linalg.qr(columns)[0]
-    found = []
-    for number, one in enumerate(names):
-        for other in names[number + 1 :]:
-            largest = float(np.linalg.svd(bases[one].T @ bases[other], compute_uv=False)[0])
+    pairs = []
+    for number, first in enumerate(names):
+        for second in names[number + 1 :]:
+            largest = float(np.linalg.svd(bases[first].T @ bases[second], compute_uv=False)[0])
             if largest > _ALIKE:
-                found.append((GROUPS[one], GROUPS[other], min(largest, 1.0)))
-    return sorted(found, key=lambda pair: -pair[2])
+                pairs.append((GROUPS[first], GROUPS[second], min(largest, 1.0)))
+    return sorted(pairs, key=lambda pair: -pair[2])
 
 
 def _condition(fit: Fit, parts: Sequence[Part]) -> float:
-    told = np.array([part.is_told for part in parts])
-    told &= np.array([part.group in _OF_CONDITION for part in parts])
-    columns = fit.slopes[:, told]
+    counted = np.array([part.is_told for part in parts])
+    counted &= np.array([part.group in _OF_CONDITION for part in parts])
+    columns = fit.slopes[:, counted]
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     sizes = np.linalg.svd(columns, compute_uv=False)
     return float(sizes[0] / max(float(sizes[-1]), 1e-300)) if len(sizes) else 1.0
@@ -394,41 +393,43 @@ def _noise(
 def _again(poses: Poses, index: Ints, q_rad: Floats, good: Bools) -> Floats:
     """Return deviations (m, 3) from the mean of a pose, each with the variance of one reading."""
     key = _same_pose(q_rad)[index] * (int(poses.target.max(initial=0)) + 1) + poses.target
-    found = [np.zeros((0, 3))]
+    deviations = [np.zeros((0, 3))]
     for pose in np.unique(key[good]):
-        own = poses.measured_mm[good & (key == pose)]
-        if len(own) > 1:
-            found.append((own - own.mean(axis=0)) * np.sqrt(len(own) / (len(own) - 1.0)))
-    return np.concatenate(found)
+        readings = poses.measured_mm[good & (key == pose)]
+        if len(readings) > 1:
+            deviations.append(
+                (readings - readings.mean(axis=0)) * np.sqrt(len(readings) / (len(readings) - 1.0))
+            )
+    return np.concatenate(deviations)
 
 
 def _rigid(poses: Poses, index: Ints, good: Bools) -> Floats:
     """Return by how much distances between two targets of the tool differ from their mean."""
-    found = [np.zeros(0)]
+    differences = [np.zeros(0)]
     for other in range(1, int(poses.target.max(initial=0)) + 1):
-        one = {int(i): at for at, i in enumerate(index) if poses.target[at] == 0 and good[at]}
+        first = {int(i): at for at, i in enumerate(index) if poses.target[at] == 0 and good[at]}
         pairs = [
-            (one[int(i)], at)
+            (first[int(i)], at)
             for at, i in enumerate(index)
-            if poses.target[at] == other and good[at] and int(i) in one
+            if poses.target[at] == other and good[at] and int(i) in first
         ]
         if len(pairs) > 2:
             a, b = np.array(pairs).T
             distance = np.linalg.norm(poses.measured_mm[a] - poses.measured_mm[b], axis=1)
-            found.append(distance - distance.mean())
-    return np.concatenate(found)
+            differences.append(distance - distance.mean())
+    return np.concatenate(differences)
 
 
 def _repeatability(poses: Poses, index: Ints, q_rad: Floats) -> float | None:
     """Return ISO 9283's RP: mean distance from the barycentre and 3 of its standard deviations."""
     key = _same_pose(q_rad)[index]
-    found = []
+    repeatabilities = []
     for pose in np.unique(key):
-        own = poses.measured_mm[(key == pose) & (poses.target == 0)]
-        if len(own) > 2:
-            distance = np.linalg.norm(own - own.mean(axis=0), axis=1)
-            found.append(float(distance.mean() + 3.0 * distance.std(ddof=1)))
-    return float(np.mean(found)) if found else None
+        readings = poses.measured_mm[(key == pose) & (poses.target == 0)]
+        if len(readings) > 2:
+            distance = np.linalg.norm(readings - readings.mean(axis=0), axis=1)
+            repeatabilities.append(float(distance.mean() + 3.0 * distance.std(ddof=1)))
+    return float(np.mean(repeatabilities)) if repeatabilities else None
 
 
 def _issues(readings: Readings, fit: Fit, rows: Ints, options: Options) -> list[Issue]:

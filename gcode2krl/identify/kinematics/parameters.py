@@ -299,8 +299,8 @@ def _add_gears(model: Model, poses: Poses) -> None:
 
 def _driven(poses: Poses) -> list[tuple[str, str, int]]:
     """Return what to call a gear's error, the motion that it changes, and the joint whose gear it is."""
-    own = [(f"A{joint} ", f"A{joint}", joint) for joint in _JOINTS]
-    return [*own, ("A3 by A2's ", "A3", 2)] if poses.a3_by_a2 else own
+    gears = [(f"A{joint} ", f"A{joint}", joint) for joint in _JOINTS]
+    return [*gears, ("A3 by A2's ", "A3", 2)] if poses.a3_by_a2 else gears
 
 
 def _add_drift(model: Model, poses: Poses) -> None:

@@ -114,13 +114,13 @@ def _targets(table: Table, given: Mapping[str, str]) -> dict[str, str]:
         if name not in table.columns:
             words = f"there is no column of numbers {name!r}; the file has {', '.join(table.names)[:300]}"
             raise input_error("run-layout", words, "--columns NAME=OURS", source=table.source)
-    found: dict[str, str] = {}
+    stated: dict[str, str] = {}
     for name, target in given.items():
         if target:
-            found[re.sub(r"_(mm|m|deg|rad)$", "", target)] = name
-    rest = [name for name in table.columns if name not in given]
+            stated[re.sub(r"_(mm|m|deg|rad)$", "", target)] = name
+    guessed = [name for name in table.columns if name not in given]
     by_rank: dict[str, list[tuple[int, str]]] = {}
-    for name, meaning in meanings(rest).items():
+    for name, meaning in meanings(guessed).items():
         plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
         if match := _APPROACH.fullmatch(plain):
             by_rank.setdefault(f"approach_{match[1]}", []).append((0, name))
@@ -133,7 +133,7 @@ def _targets(table: Table, given: Mapping[str, str]) -> dict[str, str]:
             by_rank.setdefault(match[1], []).append((1 if match[2] else 0, name))
         elif meaning.target == "t":
             by_rank.setdefault("t", []).append((0, name))
-    return {**{target: min(names)[1] for target, names in by_rank.items()}, **found}
+    return {**{target: min(names)[1] for target, names in by_rank.items()}, **stated}
 
 
 def _need(table: Table, named: Mapping[str, str], targets: Sequence[str], what: str) -> list[str]:

@@ -295,18 +295,22 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples)
     rows = thinned(whole)
     deviations = [
         Deviation(
-            **{key: one[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
-            row=_nearest(rows, one["row"]),
-            line=int(whole.line[one["row"]]),
+            **{key: deviation[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
+            row=_nearest(rows, deviation["row"]),
+            line=int(whole.line[deviation["row"]]),
         )
-        for one in nominal["differences"]
+        for deviation in nominal["differences"]
     ]
-    corners = [one["triangles_mm"].reshape(-1, 3) for one in nominal["differences"]]
+    corners = [deviation["triangles_mm"].reshape(-1, 3) for deviation in nominal["differences"]]
     counts = [len(part) for part in corners]
     points = np.concatenate(corners) if corners else np.empty((0, 3))
     solids, described = packed({axis: (points[:, k], 1e-2) for k, axis in enumerate("xyz")})
     head = content.head | {
-        "solids": {"columns": described, "counts": counts, "kinds": [one.kind for one in deviations]},
+        "solids": {
+            "columns": described,
+            "counts": counts,
+            "kinds": [deviation.kind for deviation in deviations],
+        },
     }
     compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"])
     return replace(content, head=head, solids=solids, compared=compared)

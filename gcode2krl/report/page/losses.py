@@ -89,15 +89,15 @@ def worst_windows(time_s: Floats, lost_s: Floats, line: Ints32, most: int = 3) -
     slot = ((time_s - time_s[0]) / width_s).astype(np.int64)
     sums = np.bincount(slot, weights=lost_s)
     moves = []
-    for one in np.argsort(-sums, kind="stable")[:most]:
-        rows = np.flatnonzero(slot == one)
-        if sums[one] < _WORTH_NAMING * whole_lost_s:
+    for window in np.argsort(-sums, kind="stable")[:most]:
+        rows = np.flatnonzero(slot == window)
+        if sums[window] < _WORTH_NAMING * whole_lost_s:
             continue
         lines = line[rows][line[rows] > 0]
         first, last = (int(lines.min()), int(lines.max())) if len(lines) else (0, 0)
         worst = int(rows[np.argmax(lost_s[rows])])
         start_s, end_s = float(time_s[rows[0]]), float(time_s[rows[-1]])
-        moves.append(Window(worst, start_s, end_s, first, last, float(sums[one])))
+        moves.append(Window(worst, start_s, end_s, first, last, float(sums[window])))
     return moves
 
 

@@ -42,11 +42,11 @@ def drawn_part(
     )
     maps = {"error": error_mm, "nominal": nominal_mm}
     drawn = {name: off for name, off in maps.items() if off is not None}
-    left = np.where(history.left_by >= 0, _row(rows, history.left_by), -1)
+    row_left = np.where(history.left_by >= 0, _row(rows, history.left_by), -1)
     steep = 1.0 - np.abs(history.normal[:, :, 2])
     of_cells: dict[str, tuple[Any, float]] = {
         "raw": (history.raw_mm.ravel(), _HEIGHT_STEP_MM),
-        "left": (left.ravel(), 1.0),
+        "left": (row_left.ravel(), 1.0),
         "steep": (steep.ravel(), 0.1),
     }
     cells, described = packed(of_cells | {name: (off.ravel(), _OFF_STEP_MM) for name, off in drawn.items()})

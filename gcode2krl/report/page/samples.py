@@ -95,9 +95,9 @@ class PageSamples:
         if len(rows) == len(self):
             return self
         columns: dict[str, Any] = {
-            name: one[rows] for name, one in vars(self).items() if isinstance(one, np.ndarray)
+            name: column[rows] for name, column in vars(self).items() if isinstance(column, np.ndarray)
         }
-        quantities = tuple(replace(one, values=one.values[rows]) for one in self.quantities)
+        quantities = tuple(replace(column, values=column.values[rows]) for column in self.quantities)
         near = None if self.near is None else rows_at(self.near, rows)
         return replace(self, quantities=quantities, near=near, **columns)
 

@@ -95,15 +95,15 @@ def _obstacles(cell: Cell) -> Iterator[dict[str, Any]]:
         at = base.copy()
         at[2, 3] = cell.table.z_mm
         yield _box("the table", at, flat)
-    for each in cell.obstacle:
-        frame: Floats = frames.get(each.frame, base)
-        stands = each.frame != "base"
-        if each.box_mm is not None:
-            yield _box(each.name, frame, [*each.box_mm[0], *each.box_mm[1]], stands=stands)
-        elif each.plane is not None:
-            yield _box(each.name, frame @ _across(each.plane), flat, stands=stands)
+    for obstacle in cell.obstacle:
+        frame: Floats = frames.get(obstacle.frame, base)
+        stands = obstacle.frame != "base"
+        if obstacle.box_mm is not None:
+            yield _box(obstacle.name, frame, [*obstacle.box_mm[0], *obstacle.box_mm[1]], stands=stands)
+        elif obstacle.plane is not None:
+            yield _box(obstacle.name, frame @ _across(obstacle.plane), flat, stands=stands)
         else:
-            yield {"name": each.name, "frame": frame.T.reshape(-1).tolist(), "stands": stands}
+            yield {"name": obstacle.name, "frame": frame.T.reshape(-1).tolist(), "stands": stands}
 
 
 def _box(name: str, frame: Floats, corners: list[float], *, stands: bool = False) -> dict[str, Any]:

@@ -81,8 +81,8 @@ def joint_fit(
     fits.sort(key=lambda fit: fit[0])
     least, unit, order, apart = fits[0]
     moves = np.ptp(wanted, axis=0) > _MOVES_DEG
-    beside = np.where(np.arange(6)[None, :] == order[:, None], np.inf, apart)
-    clear = bool((beside.min(axis=1) > _MUCH_WORSE * apart[np.arange(6), order])[moves[order]].all())
+    others = np.where(np.arange(6)[None, :] == order[:, None], np.inf, apart)
+    clear = bool((others.min(axis=1) > _MUCH_WORSE * apart[np.arange(6), order])[moves[order]].all())
     other = len(fits) < 2 or fits[1][0] > _MUCH_WORSE * least
     near = bool((apart[np.arange(6), order] < _NEAR_DEG).all())
     if not near or not other:

@@ -41,12 +41,12 @@ def _shared_words(book: zipfile.ZipFile) -> list[str]:
     """Return the texts that cells refer to by number."""
     if "xl/sharedStrings.xml" not in book.namelist():
         return []
-    found = []
+    texts = []
     for _, element in iterparse(book.open("xl/sharedStrings.xml")):
         if _tag(element) == "si":
-            found.append("".join(part.text or "" for part in element.iter() if _tag(part) == "t"))
+            texts.append("".join(part.text or "" for part in element.iter() if _tag(part) == "t"))
             element.clear()
-    return found
+    return texts
 
 
 def _lines(stream: IO[bytes], words: list[str]) -> list[str]:

@@ -110,14 +110,14 @@ def meanings(names: Iterable[str]) -> dict[str, Meaning]:
     names = list(names)
     plain = {name: _plain(name) for name in names}
     marks = {whole for whole, _, _ in plain.values()}
-    found = {name: _meaning(*plain[name], marks) for name in names}
-    found = {name: m if m.target else _joint(name, m.unit) for name, m in found.items()}
-    stems = {re.sub(r"\d", "#", m.target) for m in found.values() if re.fullmatch(r"\D+0\D*", m.target)}
+    known = {name: _meaning(*plain[name], marks) for name in names}
+    known = {name: m if m.target else _joint(name, m.unit) for name, m in known.items()}
+    stems = {re.sub(r"\d", "#", m.target) for m in known.values() if re.fullmatch(r"\D+0\D*", m.target)}
     return {
         name: m._replace(target=re.sub(r"\d", lambda digit: str(int(digit[0]) + 1), m.target))
         if re.sub(r"\d", "#", m.target) in stems
         else m
-        for name, m in found.items()
+        for name, m in known.items()
     }
 
 

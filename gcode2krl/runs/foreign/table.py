@@ -291,12 +291,12 @@ def _leaves(variables: Mapping[str, Any], parent: str = "") -> Iterator[tuple[st
     What Simulink calls signals or values is named by the structure around it.
     """
     for name, value in variables.items():
-        own = parent if name in ("signals", "values", "data") and parent else name
+        called = parent if name in ("signals", "values", "data") and parent else name
         if isinstance(value, np.ndarray) and value.dtype.names:
             if value.ndim == 0:
-                yield from _leaves({field: value[field].item() for field in value.dtype.names}, own)
+                yield from _leaves({field: value[field].item() for field in value.dtype.names}, called)
         elif isinstance(value, np.ndarray):
-            yield own, value
+            yield called, value
 
 
 def _of_matlab(file: Path) -> Table:
