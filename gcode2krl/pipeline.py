@@ -59,9 +59,9 @@ def predict_toolpath(
     forces: bool = True,
     begin: Begin = unseen,
 ) -> Prediction:
-    """Run every stage after the G-code; see `translation.from_python.predict`. ``targets`` may be given if they are known already.
+    """Run every stage after the G-code; see `translation.from_python.predict`.
 
-    ``begin`` is told the name of each stage as it begins.
+    ``targets`` may be given if they are known already. ``begin`` is told the name of each stage as it begins.
     """
     if targets is None:
         begin("planning")

@@ -28,12 +28,14 @@ def of_project(prediction):
 
 def test_without_being_told_no_file_is_read(part):
     prediction = predict(part, forces=False)
-    assert prediction.cell.name != "the shop's" and not of_project(prediction)
+    assert prediction.cell.name != "the shop's"
+    assert not of_project(prediction)
 
 
 def test_what_the_file_states_holds_and_is_said(part):
     prediction = predict(part, project=True)
-    assert prediction.cell.name == "the shop's" and prediction.forces is None
+    assert prediction.cell.name == "the shop's"
+    assert prediction.forces is None
     assert len(of_project(prediction)) == 1
     for words in ("cell=", "tolerance=0.2", "no-forces=True"):
         assert words in of_project(prediction)[0]
