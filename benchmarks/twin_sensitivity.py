@@ -16,14 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from gcode2krl import load_cell
+from gcode2krl import load_cell, predict
 from gcode2krl.cell.sections import Stock
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.online.depth import depth_by_side
 from gcode2krl.online.judge import judged
 from gcode2krl.online.outcome import figures_of
 from gcode2krl.online.twin import CASES, PLAY_DEG, World, simulate, twin_of
-from gcode2krl.pipeline import predict
 
 PART = Path(__file__).resolve().parent.parent / "examples" / "test_piece.nc"
 STOCK = Stock(box_mm=((0.0, -100.0, -30.0), (300.0, 100.0, 0.0)))

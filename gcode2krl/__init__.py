@@ -15,7 +15,7 @@ _HOMES = {
     "read_gcode": "gcode2krl.gcode",
     "set_targets": "gcode2krl.pipeline",
     "plan_motion": "gcode2krl.pipeline",
-    "predict": "gcode2krl.pipeline",
+    "predict": "gcode2krl.translation.from_python",
     "predict_many": "gcode2krl.batch.many",
     "Prediction": "gcode2krl.prediction",
     "solve_joints": "gcode2krl.pipeline",
@@ -62,10 +62,11 @@ if TYPE_CHECKING:
     from gcode2krl.gap.diagnosis import diagnose
     from gcode2krl.gcode import read_gcode
     from gcode2krl.krl import verify_krl, write_krl
-    from gcode2krl.pipeline import plan_motion, predict, set_targets, solve_joints
+    from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
     from gcode2krl.prediction import Prediction
     from gcode2krl.runs import Run, load_run
     from gcode2krl.runs.foreign import run_from
+    from gcode2krl.translation.from_python import predict
 
 
 def __getattr__(name: str) -> Any:

@@ -80,6 +80,7 @@ def plan_course(
     profile = krc4.plan(chain, cell)
     simplify_mm = targets.simplified.tolerance_mm if targets.simplified is not None else None
     issues = list(krc4.motion_issues(chain, profile, cell, simplify_mm))
+    issues += krc4.corner_issues(targets, chain, profile, cell)
     slower, slowed, planned_s = chain, chain.speed_mm_s, profile.total_s
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)

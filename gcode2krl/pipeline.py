@@ -1,4 +1,4 @@
-"""The stages as public functions, each a call of the chain or of one stage; `predict` is all of them."""
+"""The stages as public functions, each a call of the chain or of one stage."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gcode2krl import gcode, krc4, robot
 from gcode2krl.blockwise import plan_course
-from gcode2krl.cell import Cell, load_cell
+from gcode2krl.cell import Cell
 from gcode2krl.chain import Plan, collect, prepare
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
@@ -20,73 +20,6 @@ from gcode2krl.tables import Joints, Motion, Targets, Toolpath
 
 if TYPE_CHECKING:
     from gcode2krl.effects import Applied
-
-
-def predict(
-    part: str | Path,
-    cell: Cell | None = None,
-    *,
-    dt_s: float | None = None,
-    tolerance_mm: float | None = None,
-    simplify_mm: float | None = None,
-    chord_tolerance_mm: float = gcode.CHORD_TOLERANCE_MM,
-    block_delete: bool = False,
-    dialect: str = gcode.DEFAULT_DIALECT,
-    search: Sequence[str | Path] = (),
-    forces: bool = True,
-    effects: "Sequence[str | Applied]" = (),
-    effect_folders: Sequence[str | Path] = (),
-) -> Prediction:
-    """Run every stage on a part: G-code, targets, motion, joints, forces, deflection.
-
-    ``dt_s`` is the sample time, by default the controller's cycle; ``simplify_mm`` merges feed moves, see
-    `set_targets`; ``search`` are folders with subprograms. ``forces`` False leaves out material removal and
-    what depends on it. A stage that cannot run (no material, unknown stiffness) leaves None and a note.
-    ``effects`` such as ``backlash:target=A2,gap_deg=0.02`` are added to those of the cell;
-    ``effect_folders`` are folders with the user's own effects. Raises `NotUnderstoodError` where the G-code,
-    the cell or an option is wrong; what a program must not do is in the prediction's ``issues``.
-
-    The worst second of every tool:
-
-    >>> from gcode2krl import load_cell, predict
-    >>> samples = predict("part.nc", load_cell("cell.toml")).samples().to_pandas()
-    >>> samples["second"] = samples["time_s"].astype(int)
-    >>> worst = samples.groupby(["tool", "second"])["force_N"].max().groupby("tool").idxmax()
-    >>> list(worst.index)
-    [1]
-
-    With an effect that the nominal model leaves out, its columns stand beside the nominal ones:
-
-    >>> loose = predict("part.nc", effects=["backlash:target=A2,gap_deg=0.02"])
-    >>> sorted(loose.added)[:2]
-    ['force_meas_x_N', 'force_meas_y_N']
-    """
-    cell = cell if cell is not None else load_cell()
-    toolpath = gcode.read_gcode(
-        part,
-        cell,
-        dialect=dialect,
-        chord_tolerance_mm=chord_tolerance_mm,
-        block_delete=block_delete,
-        search=search,
-    )
-    settings: dict[str, Any] = {
-        "chord_tolerance_mm": chord_tolerance_mm,
-        "block_delete": block_delete,
-        "dialect": dialect,
-    }
-    if search:
-        settings["search"] = [str(folder) for folder in search]
-    prediction = predict_toolpath(
-        toolpath,
-        cell,
-        dt_s=dt_s,
-        tolerance_mm=tolerance_mm,
-        simplify_mm=simplify_mm,
-        settings=settings,
-        forces=forces,
-    )
-    return add_effects(prediction, effects, effect_folders)
 
 
 def add_effects(
@@ -126,9 +59,9 @@ def predict_toolpath(
     forces: bool = True,
     begin: Begin = unseen,
 ) -> Prediction:
-    """Run every stage after the G-code; see `predict`. ``targets`` may be given if they are known already.
+    """Run every stage after the G-code; see `translation.from_python.predict`.
 
-    ``begin`` is told the name of each stage as it begins.
+    ``targets`` may be given if they are known already. ``begin`` is told the name of each stage as it begins.
     """
     if targets is None:
         begin("planning")

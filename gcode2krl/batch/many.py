@@ -12,12 +12,12 @@ from gcode2krl.batch.results import why_failed
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError
 from gcode2krl.files.program_names import likely_text_bytes
-from gcode2krl.pipeline import predict
 from gcode2krl.prediction import Prediction
+from gcode2krl.translation.from_python import predict
 
 _AHEAD = 2
 """So many predictions for each process wait at most until it is their turn."""
-_Task = tuple[Path, Cell, dict[str, Any]]
+_Task = tuple[Path, Cell | None, dict[str, Any]]
 
 
 @overload
@@ -67,7 +67,7 @@ def predict_many(
     else:
         files = [Path(part) for part in parts]
     signature(predict).bind("", cell, **options)  # a wrong option is an error here, not in every worker
-    shared = cell if cell is not None else load_cell()
+    shared = load_cell() if cell is None and not options.get("project") else cell
     return _predictions([(file, shared, options) for file in files], processes, errors == "keep")
 
 

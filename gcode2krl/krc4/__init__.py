@@ -1,5 +1,6 @@
 """What the KRC4 does with LIN motions: corner parabola, time law, look-ahead."""
 
+from gcode2krl.krc4.corner_doubts import corner_issues
 from gcode2krl.krc4.course import Course, sample_motion
 from gcode2krl.krc4.laws import corner, effective_acceleration, jerk, speed_step
 from gcode2krl.krc4.motion import Chain, build_chain, motion_issues, plan, with_speed
@@ -9,6 +10,7 @@ __all__ = [
     "Course",
     "build_chain",
     "corner",
+    "corner_issues",
     "effective_acceleration",
     "jerk",
     "motion_issues",

@@ -1,6 +1,7 @@
 """Targets to Motion: the chain of LIN motions as the controller will command it."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,7 @@ _WORTH_SAYING = 0.01
 """Fraction of the time above which a loss is reported."""
 _NO_LENGTH_MM = 1e-6
 """A shorter move is rounding, as when another tool's tip is at the same place."""
+Changes = Literal["where it fits", "never", "always"]
 _STRAIGHT_COS, _NEARLY_STRAIGHT_COS = 1e-7, 0.01
 """cos(alpha/2) below which a line goes straight on without a corner, and below which it may do so."""
 _WRITTEN_MM = 1e-3
@@ -73,8 +75,11 @@ class Chain:
         return error
 
 
-def build_chain(targets: Targets, cell: Cell) -> Chain:
-    """Return the chain of a program. PTP motions inside it are modelled as straight, at the rapid speed."""
+def build_chain(targets: Targets, cell: Cell, changes: Changes = "where it fits") -> Chain:
+    """Return the chain of a program. PTP motions inside it are modelled as straight, at the rapid speed.
+
+    ``changes`` says which corners between unequal speeds make the change of speed; see `_scales`.
+    """
     programmed = np.flatnonzero(targets.move >= 0)
     first, last = int(programmed[0]), int(programmed[-1])
     rows = slice(first + 1, last + 1)
@@ -91,7 +96,7 @@ def build_chain(targets: Targets, cell: Cell) -> Chain:
     d, cos_half = _blends(start, end, size, length, targets.cdis_mm[rows])
     stop = (d <= 0.0) | (cell.controller.advance == 0)
     d[stop | _goes_straight_on(d, cos_half)] = 0.0
-    scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell)
+    scale = _scales(length, speed, acceleration, d, targets.cdis_mm[rows], stop, cell, changes)
     return Chain(
         first=first,
         start_mm=start,
@@ -306,15 +311,19 @@ def _scales(
     cdis: Floats,
     stop: Bools,
     cell: Cell,
+    changes: Changes,
 ) -> Floats:
     """Return the unit of length of each move; ``blend`` gets the distances in these units.
 
     One number stands for all where it is 1.
 
     A corner makes a change of speed where |v2 - v1|/a + k <= T, its duration (our assumption, the paper does
-    not say), and where the look-ahead lets the faster of the two be reached.
+    not say), and where the look-ahead lets the faster of the two be reached. Other assumptions are that no
+    corner does (``changes`` = "never"), or each that may ("always").
     """
-    rows = _wide_corners(length, speed, acceleration, blend, cdis, stop, cell)
+    if changes == "never":
+        return np.broadcast_to(1.0, len(length))
+    rows = _changing_corners(length, speed, acceleration, blend, cdis, stop, cell, changes == "always")
     a, k = np.minimum(acceleration[rows], acceleration[rows + 1]), cell.controller.k_s
     fastest = np.maximum(speed[rows], speed[rows + 1])
     rows = rows[fastest * (fastest / a + k) / 2 <= _in_view(length, rows, cell)]
@@ -333,7 +342,7 @@ def _scales(
     return scale
 
 
-def _wide_corners(
+def _changing_corners(
     length: Floats,
     speed: Floats,
     acceleration: Floats,
@@ -341,13 +350,16 @@ def _wide_corners(
     cdis: Floats,
     stop: Bools,
     cell: Cell,
+    every: bool,
 ) -> Ints:
-    """Return the moves that end in a corner long enough for the change of speed there."""
+    """Return the moves that end in a corner between unequal speeds, long enough for it or ``every`` one."""
 
     def part(first: int, behind: int) -> Ints:
         here = slice(first, behind)
         changing = (blend[here] > 0) & ~stop[here] & (speed[here] != speed[first + 1 : behind + 1])
         rows = np.flatnonzero(changing) + first
+        if every:
+            return rows
         v1, v2 = speed[rows], speed[rows + 1]
         widest = _widest(length, v2 / v1, cdis, rows)
         a = np.minimum(acceleration[rows], acceleration[rows + 1])

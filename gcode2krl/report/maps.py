@@ -171,7 +171,6 @@ def draw_map(
     image = shading.image(canvas, points, shading.coloured)
     drawn = _show(axes, image, canvas, cmap=shading.colours, norm=shading.norm)
     axes.set_aspect(stretch, adjustable="datalim")
-    axes.set_autoscale_on(False)  # marks outside are left out
     axes.set_xlabel(f"{'XYZ'[columns[0]]} (mm)")
     axes.set_ylabel(f"{'XYZ'[columns[1]]} (mm)")
     return drawn

@@ -1,12 +1,13 @@
 """The commanded path as a matplotlib figure, after figure 4 of Bigliardi et al. 2022."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from gcode2krl.arrays import Bools, Floats
@@ -237,12 +238,17 @@ def _views(
 def _mark_corner(views: list[tuple[Axes, list[int]]], targets: Targets, corner: Corner) -> None:
     at = targets.position_mm[corner.target]
     for axes, columns in views:
-        axes.plot(*at[columns], "o", ms=13, mfc="none", mec=VERMILION, mew=1.2, zorder=6)
+        _mark(axes, at[columns], "o", ms=13, mfc="none", mec=VERMILION, mew=1.2, zorder=6)
 
 
 def _mark_ends(axes: Axes, path: Floats) -> None:
-    axes.plot(*path[0], "^", color=GREEN, mec=BLACK, mew=0.7, ms=8, zorder=5, label="start")
-    axes.plot(*path[-1], "s", color=VERMILION, mec=BLACK, mew=0.7, ms=7, zorder=5, label="end")
+    _mark(axes, path[0], "^", color=GREEN, mec=BLACK, mew=0.7, ms=8, zorder=5, label="start")
+    _mark(axes, path[-1], "s", color=VERMILION, mec=BLACK, mew=0.7, ms=7, zorder=5, label="end")
+
+
+def _mark(axes: Axes, at: Floats, marker: str, **style: Any) -> None:
+    """Mark a place; as an artist it does not widen the view, so one outside is left out."""
+    axes.add_artist(Line2D(at[:1], at[1:], ls="", marker=marker, **style))
 
 
 def _programmed_mm(targets: Targets, motion: Motion) -> Floats:

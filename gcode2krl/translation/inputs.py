@@ -152,7 +152,13 @@ def read_cell_under_job(
 
     The findings say where they differ.
     """
-    cell = read_cell(path)
+    return under_job(read_cell(path), job_path, tools_path)
+
+
+def under_job(
+    cell: "Cell", job_path: str | Path | None, tools_path: str | Path | None = None
+) -> "tuple[Cell, tuple[Issue, ...]]":
+    """Return a cell with the tools of a library, under a job; the findings say where they differ."""
     issues: tuple[Issue, ...] = ()
     if tools_path is not None:
         from gcode2krl.cell.job import with_tools

@@ -6,7 +6,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.measured_slots import MEASURED_N, fit_of, held_out
+from benchmarks.measured_slots import MILLS, error_of, fit_of, held_out
+from gcode2krl.cell.library import read_model
+from gcode2krl.cell.sections import Material
 from gcode2krl.errors import RefusedError
 from gcode2krl.identify.force import NAMES, UNTESTED_BAND, fit_force
 
@@ -15,6 +17,7 @@ ZERO = np.array([5.0, -8.0, 3.0])
 N = 3
 AUTHOR = np.array([958.86, 250.863, 146.361, 15.758, 19.434, 18.2075])
 """What the author of the measured slots fitted to them."""
+FLAT = MILLS["flat"]
 
 
 def slot_basis(f_z_mm, a_p_mm):
@@ -74,7 +77,7 @@ def test_one_feed_cannot_tell_cutting_from_edge():
 
 def test_one_confounding_leaves_the_other_coefficients_alone():
     """At one depth without air the edges' force is a constant, as the sensor's zero is."""
-    fit = fit_of(MEASURED_N, zeroed=False)
+    fit = fit_of(FLAT, FLAT.cuts, zeroed=False)
     np.testing.assert_array_equal(fit.determined, [True, True, True, False, False, False])
     np.testing.assert_allclose(fit.value[:3], AUTHOR[:3], rtol=0.014)
     with pytest.raises(RefusedError, match="Kte, Kre, Kae") as refused:
@@ -84,22 +87,31 @@ def test_one_confounding_leaves_the_other_coefficients_alone():
 
 @pytest.mark.parametrize("told", [{"zeroed": True}, {"zeroed": False, "in_air": 40}])
 def test_a_known_zero_gives_what_the_author_found(told):
-    fit = fit_of(MEASURED_N, **told)
+    fit = fit_of(FLAT, FLAT.cuts, **told)
     assert fit.determined.all()
     np.testing.assert_allclose(fit.value, AUTHOR, rtol=0.014)
 
 
-def test_held_out_slots_are_inside_the_band_of_the_others():
-    inside = {f_z: error <= band for f_z, error, band, within in held_out() if within}
-    assert len(inside) == 3
-    assert all(inside.values())
+@pytest.mark.parametrize("mill", MILLS)
+def test_held_out_slots_are_inside_the_band_of_the_others(mill):
+    inside = [error <= band for _, error, band, within in held_out(MILLS[mill]) if within]
+    assert inside == [True] * 3
+
+
+@pytest.mark.parametrize("mill", ["bull-nose", "ball"])
+def test_slots_with_round_edges_are_inside_the_band_of_the_set_for_their_alloy(mill):
+    """The set was not fitted to them."""
+    material = Material.model_validate(read_model("materials", "Al 7075-T6"))
+    for cut in MILLS[mill].cuts:
+        force = MILLS[mill].force_N(cut, material.linear_edge.array())
+        assert error_of(force, cut) < (0.25 if cut.a_p_mm == 1.0 else 0.14) < material.relative_band
 
 
 def test_the_band_is_that_of_cuts_left_out_and_not_of_noise():
     """The law bends below 0.05 mm, which noise-free means cannot show."""
-    thicker = fit_of([f_z for f_z in MEASURED_N if f_z > 0.03])
-    assert fit_of(MEASURED_N).relative_band > 1.4 * thicker.relative_band
-    assert fit_of([0.075, 0.1]).relative_band >= UNTESTED_BAND
+    thicker = fit_of(FLAT, FLAT.cuts[1:])
+    assert fit_of(FLAT, FLAT.cuts).relative_band > 1.4 * thicker.relative_band
+    assert fit_of(FLAT, FLAT.cuts[2:4]).relative_band >= UNTESTED_BAND
 
 
 def test_a_run_in_air_is_refused():

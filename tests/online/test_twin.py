@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl import load_cell
+from gcode2krl import load_cell, predict
 from gcode2krl.cell.sections import Stock
 from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of
@@ -14,7 +14,6 @@ from gcode2krl.online.judge import floor_over, grid_of, judged
 from gcode2krl.online.outcome import as_json, figures_of, findings, simulate_all
 from gcode2krl.online.surface import surface_of
 from gcode2krl.online.twin import World, simulate, stiffer, twin_of
-from gcode2krl.pipeline import predict
 
 SLOT = """\
 T1 M6

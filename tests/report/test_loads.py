@@ -146,6 +146,12 @@ def test_a_move_to_the_tool_changer_does_not_shrink_the_part(circles):
     assert (left, right) == pytest.approx((30.0, 70.0), abs=1.0)
 
 
+def test_drawing_a_map_warns_of_nothing(caplog):
+    motion = motion_of(targets_of(DOG_LEG))
+    draw(coloured_path_figure(toolpath_of(DOG_LEG), motion, np.ones(len(motion)), "force (N)", "Force"))
+    assert not caplog.records, "limits that are fixed fight the aspect"
+
+
 @pytest.mark.slow
 def test_all_in_air_is_pale():
     motion = motion_of(targets_of(DOG_LEG))
