@@ -205,6 +205,7 @@ def read_stream(
     interpreter = _Interpreter(
         name,
         spoken,
+        mounted_tool=0 if cell is None else cell.mounted_tool or 0,
         offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=stated.length_mm,
@@ -213,7 +214,6 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
-        mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
     read_pieces = pieces(stream, name)
@@ -274,11 +274,6 @@ def _of_cell(dialect: Dialect, cell: "Cell | None") -> Dialect:
     return replace(with_cutter(dialect, cutter.lead_in, cutter.d), start=start)
 
 
-def _mounted_tool(cell: "Cell | None") -> int:
-    """Return the tool that is in the spindle at the start, -1 where nobody says which."""
-    return -1 if cell is None or cell.mounted_tool is None else cell.mounted_tool
-
-
 def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
     """Return what the interpreter has to know of the machine: its letters, and what X, Y, Z mean."""
     machine = cell.machine if cell is not None else None
@@ -335,12 +330,18 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
+    def __init__(self, name: str, spoken: Dialect, mounted_tool: int, **settings: Any) -> None:
+        """Begin with a tool in the spindle, 0 = none, and with its length where M6 takes that too."""
         self.name, self.spoken = name, spoken
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
         for key, value in spoken.start.items():
             self.state[key] = value
         self.columns = Columns(_FIRST_ROWS, with_rotary=settings["rotary_axes"] != 0)
+        self.state["tool"] = mounted_tool
+        if mounted_tool and settings["lengths_from_table"]:
+            known_mm = settings["tool_length_mm"][mounted_tool : mounted_tool + 1]
+            self.state["length_offset"] = np.nan_to_num(known_mm).sum()
+            self.state["offset_tool"] = mounted_tool
         self.chord_tolerance_mm = settings["chord_tolerance_mm"]
         self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)

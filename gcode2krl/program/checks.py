@@ -369,7 +369,9 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    other = feed & (toolpath.tool > 0) & (toolpath.length_offset_tool != toolpath.tool)
+    offset = toolpath.length_offset_tool
+    touched_off = np.arange(len(toolpath)) <= _first_change(toolpath)  # with the mounted tool
+    other = feed & (toolpath.tool > 0) & (offset != toolpath.tool) & ~(touched_off & (offset < 0))
     for row in _stretches(other):
         number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
         tool = cell.tool.get(number)
@@ -409,8 +411,18 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
+    moves = toolpath.is_position() & ~toolpath.machine
+    first = int(np.argmax(moves))
+    if moves[first] and toolpath.tool[first] > 0 and first <= _first_change(toolpath):
+        yield Issue(
+            "warning",
+            "tool-assumed",
+            int(toolpath.source_line[first]),
+            f"no tool has been named (T… M6); tool {toolpath.tool[first]} is taken as mounted",
+            "program T and M6",
+        )
     for number in used_tools(toolpath):
-        row = int(np.argmax(toolpath.is_position() & ~toolpath.machine & (toolpath.tool == number)))
+        row = int(np.argmax(moves & (toolpath.tool == number)))
         line = int(toolpath.source_line[row])
         for event in toolpath.events:
             if event.kind == "tool" and event.values["tool"] == number:
@@ -418,7 +430,7 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
                 break
         if number == 0:
             emptied = any(event.kind == "tool" and event.values["tool"] == 0 for event in toolpath.events)
-            yield from _no_tool(cell, line, emptied)
+            yield from _no_tool(line, emptied)
         elif number not in cell.tool:
             yield Issue(
                 "error",
@@ -439,27 +451,23 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             )
 
 
-def _no_tool(cell: Cell, line: int, emptied: bool) -> Iterator[Issue]:
-    mounted = cell.mounted_tool
+def _first_change(toolpath: Toolpath) -> int:
+    """Return the row of the first tool change; the cell's mounted tool is in the spindle up to it."""
+    return min((event.row for event in toolpath.events if event.kind == "tool"), default=len(toolpath))
+
+
+def _no_tool(line: int, emptied: bool) -> Iterator[Issue]:
     if emptied:
         yield Issue(
             "error", "tool-missing", line, "moves with an empty spindle (T0 M6)", "change to a tool first"
         )
-    elif mounted is None or mounted not in cell.tool:
+    else:
         yield Issue(
             "error",
             "tool-missing",
             line,
             "no tool has been named (T… M6), and the cell does not say which is mounted",
             "program T and M6, or give mounted_tool in the cell",
-        )
-    else:
-        yield Issue(
-            "warning",
-            "tool-assumed",
-            line,
-            f"no tool has been named (T… M6); tool {mounted} is taken as mounted",
-            "program T and M6",
         )
 
 
