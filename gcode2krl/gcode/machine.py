@@ -60,7 +60,8 @@ MACHINE = StructOf(
 
 ``offsets`` are those of `state.WORK_OFFSETS` (n, 4): X, Y, Z in mm, rotation about Z in degrees. G10
 writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared. ``saved`` are the
-modes that M70 and M73 have saved, one row a level of calls. ``lead`` and ``d_holds`` are those of `dialect_marks`.
+modes that M70 and M73 have saved, one row a level of calls. ``lead`` and ``d_holds`` are those of
+`dialect_marks`.
 """
 
 run = core_function("gcode_run", MACHINE, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)
