@@ -102,7 +102,15 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     if "g43-missing" in codes:
         yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
     if "spindle-off" in codes:
-        yield "spindle-off", "", ("--allow", "spindle-off")
+        yield "spindle-off", "[program.start]\nspindle_rpm = 10000.0\n", ()
+    if "undefined-position" in codes:
+        yield "undefined-position", "[program.start]\nposition_mm = [0.0, 0.0, 50.0]\n", ()
+    speeds = [float(s) for m in messages.get("spindle-speed", ()) for s in re.findall(r"^S(\d+) is", m)]
+    if speeds:
+        yield "spindle-speed", f"[spindle]\nmax_rpm = {max(speeds)}\n", ()
+    mounted = [n for m in messages.get("tool-not-changed", ()) for n in re.findall(r"\bT(\d+)\b", m)]
+    if mounted:
+        yield "tool-not-changed", f"mounted_tool = {mounted[0]}\n", ()
     if codes & {"out-of-reach", "joint-limit", "singularity", "home-limit"} and extent_mm:
         yield "out-of-reach", extent_mm, ()
     unmapped = {m for text in messages.get("m-code-unmapped", ()) for m in re.findall(r"\bM(\d+)\b", text)}
@@ -148,7 +156,28 @@ def mended(text: bytes, first: Attempt) -> tuple[bytes, tuple[str, ...]]:
     if any(code == "bad-character" and "'*'" in message for code, message in first.errors):
         text = re.sub(rb"\*\d+[ \t]*(?=\r?$)", b"", text, flags=re.MULTILINE)
         done.append("bad-character")
+    for code, remedy, pattern, by in _TEXT_REMEDIES:
+        if code in codes and remedy in first.printed:
+            text = re.sub(pattern, by, text, count=int(code == "no-feed"), flags=re.MULTILINE | re.IGNORECASE)
+            done.append(code)
+    stopped = [int(n) for n in re.findall(r":(\d+): error: feed move with the spindle off", first.printed)]
+    if stopped and "it was stopped by" in first.printed:
+        lines = text.split(b"\n")
+        for number in sorted(stopped, reverse=True):
+            lines.insert(number - 1, b"S10000 M3")
+        text = b"\n".join(lines)
     return text, tuple(done)
+
+
+_TEXT_REMEDIES = (
+    ("bad-character", "remove the line: $", rb"^\s*\$.*$", b""),
+    ("no-number", "or remove the letter", rb"^(\s*(?:N\d+)?\s*G0*28)((?:\s*[XYZ])+)(?=\s*(?:[;(]|\r?$))", rb"\1"),
+    ("unknown-letter", "write it out", rb"[-+]?\d*\.?\d+\^?e-(?:[6-9]|\d\d+)", b"0"),
+    ("unknown-g", "remove G50", rb"\bG50\b(?!\.)", b""),
+    ("no-feed", "program F before", rb"^([^;(\n]*\bG0*[123]\b[^;(\r\n]*)", rb"\1 F600"),
+    ("feed-too-high", "write at most that", rb"F\d{6,}(?:\.\d*)?", b"F120000"),
+)
+"""Remedies that change the text: the code, words of the remedy, what is replaced, and by what."""
 
 
 def _without_inner_comments(line: bytes) -> bytes:
@@ -201,19 +230,16 @@ def try_program(part: Path, limit_s: float, always: tuple[str, ...] = ()) -> Res
 
 
 def _joined(texts: Iterator[str]) -> str:
-    """Return the text of a cell, plain keys before tables, and each table once."""
-    plain, tables = [], dict[str, list[str]]()
+    """Return the text of a cell, plain keys before tables, each table and each of its keys once, as said last."""
+    tables: dict[str, dict[str, str]] = {"": {}}
     for text in texts:
         head = ""
         for line in text.splitlines():
             if line.startswith("["):
                 head = line
-                tables.setdefault(head, [])
-            elif head:
-                tables[head].append(line)
             else:
-                plain.append(line)
-    return "\n".join([*plain, *(f"{head}\n" + "\n".join(lines) for head, lines in tables.items())]) + "\n"
+                tables.setdefault(head, {})[line.partition(" = ")[0]] = line
+    return "\n".join(line for head, keys in tables.items() for line in (head, *keys.values())) + "\n"
 
 
 def _into_reach(part: Path) -> str:

@@ -220,6 +220,8 @@ def initial_state() -> NDArray[np.void]:
     return state
 
 
+KNOWN_AXES = ("known_x", "known_y", "known_z")
+"""Fields of the state: whether an axis has a place that is stated."""
 AT_START = -1
 """Instead of a line: the control starts so."""
 

@@ -1,10 +1,13 @@
-"""A start that the cell states: the mounted tool is in the spindle, for every check, until the first M6."""
+"""A start that the cell states: tool, spindle and place of the tip, for every check, until the program changes them."""
 
 import io
 
+import numpy as np
 import pytest
 
-from gcode2krl import load_cell
+from gcode2krl import load_cell, set_targets, write_krl
+from gcode2krl.cell.sections.fields import Frame
+from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.program.checks import check_toolpath
 
@@ -74,3 +77,50 @@ def test_that_it_is_assumed_is_said_only_where_it_moves():
     assert "tool-assumed" not in codes(f"T1 M6\nG43 H1\nS900 M3\n{CUT}", cell())
     assert "tool-missing" in codes(f"S900 M3\n{CUT}", cell(mounted_tool=None))
     assert "tool-missing" in codes(f"T0 M6\nS900 M3\n{CUT}", cell())
+
+
+def stated(**start):
+    program = load_cell().program
+    return cell(program=program.model_copy(update={"start": program.start.model_copy(update=start)}))
+
+
+def test_a_spindle_that_is_switched_by_hand_turns_until_the_program_stops_it():
+    by_hand = stated(spindle_rpm=4000.0)
+    toolpath = read(CUT, by_hand)
+    assert toolpath.spindle_rad_s[:5].tolist() == pytest.approx([4000 * 2 * np.pi / 60] * 5)
+    assert toolpath.events[0].values["m"] == 5  # nothing of the robot has switched it on
+    assert "spindle-off" in codes(CUT, cell())
+    assert not {"spindle-off", "spindle-speed"} & codes(CUT, by_hand)
+    assert "spindle-off" in codes("M5\n" + CUT, by_hand)
+    assert "spindle-off" in codes("T1 M6\nG43 H1\n" + CUT, by_hand)
+    assert "spindle-speed" in codes(CUT, stated(spindle_rpm=9000.0))
+
+
+def test_the_program_halts_until_a_person_has_seen_the_spindle_turn(tmp_path):
+    cases = (("A", stated(spindle_rpm=4000.0), "", 1), ("B", stated(), "S4000 M3\n", 0))
+    for name, of_cell, first, asked in cases:
+        write_krl(set_targets(read(first + CUT, of_cell), of_cell), tmp_path / f"{name}.src", of_cell)
+        before_motion = (tmp_path / f"{name}.src").read_text("utf-8").partition("\nPTP ")[0]
+        assert before_motion.count("Spindle switched by hand: does it turn at 4000 rpm?") == asked
+        assert before_motion.count("\nHALT") >= 1 + asked
+
+
+def test_the_tip_begins_where_the_cell_says():
+    """The rows are those of the program with a G0 to that place before it, under G91 too."""
+    there = stated(position_mm=(5.0, -2.0, 30.0), spindle_rpm=4000.0)
+    for text in ("G1 Z-1 F600\nX20\nG0 Z50\nM2\n", "G91\nG1 Z-4 F600\nX20\nG0 Z50\nM2\n"):
+        begun, written = read(text, there), read(f"G0 X5 Y-2 Z30\nG90\n{text}", stated(spindle_rpm=4000.0))
+        assert begun.position_mm.tolist() == written.position_mm.tolist()
+        assert begun.is_position().tolist() == written.is_position().tolist()
+        assert begun.rapid.tolist() == written.rapid.tolist()
+        assert begun.feed_mm_s.tolist() == written.feed_mm_s.tolist()
+        assert "undefined-position" in codes(text, stated(spindle_rpm=4000.0))
+        assert "undefined-position" not in codes(text, there)
+
+
+def test_a_place_at_the_start_that_would_be_ambiguous_is_refused():
+    turned = {"G54": Frame(x_mm=0, y_mm=0, z_mm=0, a_deg=30, b_deg=0, c_deg=0)}
+    of_cell = stated(position_mm=(0.0, 0.0, 50.0)).model_copy(update={"work_offsets": turned})
+    with pytest.raises(NotUnderstoodError) as error:
+        read(CUT, of_cell)
+    assert error.value.issues[0].code == "cell-key"
