@@ -171,7 +171,12 @@ def mended(text: bytes, first: Attempt) -> tuple[bytes, tuple[str, ...]]:
 
 _TEXT_REMEDIES = (
     ("bad-character", "remove the line: $", rb"^\s*\$.*$", b""),
-    ("no-number", "or remove the letter", rb"^(\s*(?:N\d+)?\s*G0*28)((?:\s*[XYZ])+)(?=\s*(?:[;(]|\r?$))", rb"\1"),
+    (
+        "no-number",
+        "or remove the letter",
+        rb"^(\s*(?:N\d+)?\s*G0*28)((?:\s*[XYZ])+)(?=\s*(?:[;(]|\r?$))",
+        rb"\1",
+    ),
     ("unknown-letter", "write it out", rb"[-+]?\d*\.?\d+\^?e-(?:[6-9]|\d\d+)", b"0"),
     ("unknown-g", "remove G50", rb"\bG50\b(?!\.)", b""),
     ("no-feed", "program F before", rb"^([^;(\n]*\bG0*[123]\b[^;(\r\n]*)", rb"\1 F600"),

@@ -213,8 +213,8 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterato
             int(toolpath.source_line[row]),
             f"feed move from a position whose {_named(missing)} has not been programmed: "
             + "; ".join(_why_unknown(toolpath, row, axis) for axis in missing),
-            "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too), or state where the tip "
-            "stands at the start: [program.start] position_mm in the cell",
+            "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too), or state in the cell "
+            "where the tip stands at the start: [program.start] position_mm",
         )
 
 
@@ -349,7 +349,7 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             int(toolpath.source_line[row]),
             f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:.0f} mm/min is above the largest path speed, "
             f"{most_mm_s * S_PER_MIN:.0f} mm/min",
-            "check F and the unit (G20/G21); where F asks for all that the machine can do, write at most that",
+            "check F and the unit (G20/G21); where F asks for all that the machine can, write at most that",
         )
     for row in _stretches(feed & (toolpath.feed_mm_s > 0) & (toolpath.feed_mm_s < _SLOWEST_MM_S)):
         yield Issue(

@@ -1,4 +1,4 @@
-"""A start that the cell states: tool, spindle and place of the tip, for every check, until the program changes them."""
+"""A start that the cell states: tool, spindle and place of the tip, until the program changes them."""
 
 import io
 
