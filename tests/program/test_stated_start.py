@@ -124,3 +124,11 @@ def test_a_place_at_the_start_that_would_be_ambiguous_is_refused():
     with pytest.raises(NotUnderstoodError) as error:
         read(CUT, of_cell)
     assert error.value.issues[0].code == "cell-key"
+
+
+def test_a_zero_that_is_set_where_the_tip_stands_is_there():
+    there = stated(position_mm=(100.0, 0.0, 30.0), spindle_rpm=4000.0)
+    for zero in ("G92 X0 Y0 Z0", "G10 L20 P1 X0 Y0 Z0"):
+        toolpath = read(f"{zero}\nG1 X10 F600\nM2\n", there)
+        assert toolpath.position_mm[-1].tolist() == [110.0, 0.0, 30.0]
+        assert not {issue.code for issue in toolpath.issues} & {"offset-at-start", "offset-from-unknown"}

@@ -48,7 +48,7 @@ class Start(Section):
     feed: Literal["G94", "G95"] | None = None
     retract: Literal["G98", "G99"] | None = None
     spindle_rpm: Positive | None = None
-    """Speed at which a spindle turns that is switched by hand: the program halts until a person has seen it."""
+    """Of a spindle that is switched by hand: the program halts until a person has seen it turn."""
     position_mm: Point | None = None
     """Where the tip stands, in ``$BASE``: the program goes there first."""
 
