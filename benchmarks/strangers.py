@@ -3,8 +3,8 @@
 ``python benchmarks/strangers.py FOLDER [FOLDER …] [--most N] [--tools LIBRARY] [--json]`` runs the command
 line on every G-code file below the folders, each in a process of its own with a time limit, as a user would
 type it: the built-in cell, no options but --tools. Where the program is refused, each printed remedy that
-`remedies` knows is followed once (a key in a cell based on the demonstration, an option, the part moved into
-reach), and it is run again.
+`remedies` and `mended` know is followed (a key in a cell based on the demonstration, an option, a word of the
+program, the part moved into reach), and it is run again: after one round of remedies, or after a second one.
 Programs in a language that is not read yet (expressions, subprograms, cutter compensation, canned cycles,
 probing, turning) are counted apart. The exit code is always 0: figures are printed, not judged.
 """
@@ -65,7 +65,7 @@ class Result:
 
     name: str
     verdict: str
-    """at once, after remedies, refused, language, time."""
+    """at once, after remedies, after more, refused, language, time."""
     codes: tuple[str, ...]
     remedies: tuple[str, ...]
     seconds: float
@@ -102,7 +102,15 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     if "g43-missing" in codes:
         yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
     if "spindle-off" in codes:
-        yield "spindle-off", "", ("--allow", "spindle-off")
+        yield "spindle-off", "[program.start]\nspindle_rpm = 10000.0\n", ()
+    if codes & {"undefined-position", "offset-from-unknown"}:
+        yield "undefined-position", "[program.start]\nposition_mm = [0.0, 0.0, 50.0]\n", ()
+    speeds = [float(s) for m in messages.get("spindle-speed", ()) for s in re.findall(r"^S(\d+) is", m)]
+    if speeds:
+        yield "spindle-speed", f"[spindle]\nmax_rpm = {max(speeds)}\n", ()
+    mounted = [n for m in messages.get("tool-not-changed", ()) for n in re.findall(r"\bT(\d+)\b", m)]
+    if mounted:
+        yield "tool-not-changed", f"mounted_tool = {mounted[0]}\n", ()
     if codes & {"out-of-reach", "joint-limit", "singularity", "home-limit"} and extent_mm:
         yield "out-of-reach", extent_mm, ()
     unmapped = {m for text in messages.get("m-code-unmapped", ()) for m in re.findall(r"\bM(\d+)\b", text)}
@@ -148,7 +156,33 @@ def mended(text: bytes, first: Attempt) -> tuple[bytes, tuple[str, ...]]:
     if any(code == "bad-character" and "'*'" in message for code, message in first.errors):
         text = re.sub(rb"\*\d+[ \t]*(?=\r?$)", b"", text, flags=re.MULTILINE)
         done.append("bad-character")
+    for code, remedy, pattern, by in _TEXT_REMEDIES:
+        if code in codes and remedy in first.printed:
+            text = re.sub(pattern, by, text, count=int(code == "no-feed"), flags=re.MULTILINE | re.IGNORECASE)
+            done.append(code)
+    stopped = [int(n) for n in re.findall(r":(\d+): error: feed move with the spindle off", first.printed)]
+    if stopped and "it was stopped by" in first.printed:
+        lines = text.split(b"\n")
+        for number in sorted(stopped, reverse=True):
+            lines.insert(number - 1, b"S10000 M3")
+        text = b"\n".join(lines)
     return text, tuple(done)
+
+
+_TEXT_REMEDIES = (
+    ("bad-character", "remove the line: $", rb"^\s*\$.*$", b""),
+    (
+        "no-number",
+        "or remove the letter",
+        rb"^(\s*(?:N\d+)?\s*G0*28)((?:\s*[XYZ])+)(?=\s*(?:[;(]|\r?$))",
+        rb"\1",
+    ),
+    ("unknown-letter", "write it out", rb"[-+]?\d*\.?\d+\^?e-(?:[6-9]|\d\d+)", b"0"),
+    ("unknown-g", "remove G50", rb"\bG50\b(?!\.)", b""),
+    ("no-feed", "program F before", rb"^([^;(\n]*\bG0*[123]\b[^;(\r\n]*)", rb"\1 F600"),
+    ("feed-too-high", "write at most that", rb"F\d{6,}(?:\.\d*)?", b"F120000"),
+)
+"""Remedies that change the text: the code, words of the remedy, what is replaced, and by what."""
 
 
 def _without_inner_comments(line: bytes) -> bytes:
@@ -163,57 +197,55 @@ def _without_inner_comments(line: bytes) -> bytes:
 
 
 def try_program(part: Path, limit_s: float, always: tuple[str, ...] = ()) -> Result:
-    """Run a program at once and, where it is refused, once more with its remedies followed.
+    """Run a program at once and, while it is refused, once or twice more with its remedies followed.
 
-    ``always`` are options of both runs.
+    ``always`` are options of all runs.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        first = attempt(part, folder, always, limit_s)
-        codes = tuple(sorted({code for code, _ in first.errors}))
-        last_words = tuple(message[:110] for _, message in first.errors[:3])
-        if first.exit_code is None:
-            return Result(part.name, "time", codes, (), first.seconds, 0, ())
-        if first.exit_code == 0:
-            return Result(part.name, "at once", first.warnings, (), first.seconds, first.longest_list, ())
-        followed = list(remedies(first, _into_reach(part)))
-        text, changed = mended(part.read_bytes(), first)
-        if followed or changed:
-            again = folder / part.name
+        again, cell = folder / part.name, folder / "cell.toml"
+        done = first = attempt(part, folder, always, limit_s)
+        followed: list[tuple[str, str, tuple[str, ...]]] = []
+        text, names = part.read_bytes(), dict[str, None]()
+        for verdict in ("at once", "after remedies", "after more"):
+            if done.exit_code is None:
+                return Result(part.name, "time", _codes(done), tuple(names), done.seconds, 0, ())
+            if done.exit_code == 0:
+                codes = first.warnings if done is first else _codes(first)
+                longest = first.longest_list
+                return Result(part.name, verdict, codes, tuple(names), first.seconds, longest, ())
+            new = [one for one in remedies(done, _into_reach(part)) if one not in followed]
+            text, changed = mended(text, done)
+            if verdict == "after more" or not (new or changed):
+                break
+            followed += new
+            names |= dict.fromkeys((*(code for code, _, _ in new), *changed))
             again.write_bytes(text)
-            cell = folder / "cell.toml"
             cell.write_text(
                 'based_on = "demonstration"\n' + _joined(text for _, text, _ in followed), "utf-8"
             )
-            options = tuple(word for _, _, words in followed for word in words)
-            second = attempt(again, folder, ("--cell", str(cell), *options, *always), limit_s)
-            names = tuple(dict.fromkeys((*(code for code, _, _ in followed), *changed)))
-            if second.exit_code == 0:
-                return Result(
-                    part.name, "after remedies", codes, names, first.seconds, first.longest_list, ()
-                )
-            if second.exit_code is None:
-                return Result(part.name, "time", codes, names, second.seconds, first.longest_list, last_words)
-            last_words = tuple(message[:110] for _, message in second.errors[:3]) or last_words
-            codes = tuple(sorted({code for code, _ in second.errors})) or codes
-        verdict = "language" if set(codes) & LANGUAGE else "refused"
-        return Result(part.name, verdict, codes, (), first.seconds, first.longest_list, last_words)
+            options = (word for _, _, words in followed for word in words)
+            done = attempt(again, folder, ("--cell", str(cell), *options, *always), limit_s)
+        last_words = tuple(message[:110] for _, message in done.errors[:3])
+        verdict = "language" if set(_codes(done)) & LANGUAGE else "refused"
+        return Result(part.name, verdict, _codes(done), (), first.seconds, first.longest_list, last_words)
+
+
+def _codes(done: Attempt) -> tuple[str, ...]:
+    return tuple(sorted({code for code, _ in done.errors}))
 
 
 def _joined(texts: Iterator[str]) -> str:
-    """Return the text of a cell, plain keys before tables, and each table once."""
-    plain, tables = [], dict[str, list[str]]()
+    """Return the text of a cell, plain keys before tables, each table and key once, as said last."""
+    tables: dict[str, dict[str, str]] = {"": {}}
     for text in texts:
         head = ""
         for line in text.splitlines():
             if line.startswith("["):
                 head = line
-                tables.setdefault(head, [])
-            elif head:
-                tables[head].append(line)
             else:
-                plain.append(line)
-    return "\n".join([*plain, *(f"{head}\n" + "\n".join(lines) for head, lines in tables.items())]) + "\n"
+                tables.setdefault(head, {})[line.partition(" = ")[0]] = line
+    return "\n".join(line for head, keys in tables.items() for line in (head, *keys.values())) + "\n"
 
 
 def _into_reach(part: Path) -> str:
@@ -277,7 +309,10 @@ def main(argv: list[str] | None = None) -> None:
     read = [r for r in results if r.verdict != "language"]
     figures = {
         "programs": len(results),
-        **{name: counts[name] for name in ("at once", "after remedies", "refused", "time", "language")},
+        **{
+            name: counts[name]
+            for name in ("at once", "after remedies", "after more", "refused", "time", "language")
+        },
         "refused by the pilot": sum(
             any(c.startswith("pilot") for c in r.codes) for r in read if r.verdict == "refused"
         ),

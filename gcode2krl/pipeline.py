@@ -1,7 +1,7 @@
 """The stages as public functions, each a call of the chain or of one stage."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from gcode2krl import gcode, krc4, robot
 from gcode2krl.blockwise import plan_course
 from gcode2krl.cell import Cell
 from gcode2krl.chain import Plan, collect, prepare
+from gcode2krl.errors import Issue
 from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
@@ -39,7 +40,22 @@ def add_effects(
     applied = [*from_cell(cell, known), *resolve(effects, known, cell)]
     changed = with_effects(prediction, applied, plan=_plan_anew(prediction))
     named = [str(effect) for effect in effects]
-    return replace(changed, inputs={**changed.inputs, "effects": named})
+    issues = (*changed.issues, *_weights_unknown(applied, cell))
+    return replace(changed, issues=issues, inputs={**changed.inputs, "effects": named})
+
+
+def _weights_unknown(applied: "Sequence[Applied]", cell: Cell) -> Iterator[Issue]:
+    """Yield a finding where effects that feel the weight of the links feel none."""
+    feeling = [effect.label for effect in applied if effect.effect.feels_weight]
+    if feeling and cell.robot.drives.link_mass_kg is None:
+        yield Issue(
+            "warning",
+            "effect-weightless",
+            0,
+            f"the masses of the links of {cell.robot.title} are not known: {', '.join(feeling)} "
+            f"{'feels' if len(feeling) == 1 else 'feel'} the cutting force and the payload alone",
+            "state robot.drives.link_mass_kg; init --controller ARM.urdf reads those of a maker's file",
+        )
 
 
 def _plan_anew(prediction: Prediction) -> Callable[[Targets, Cell], Motion]:

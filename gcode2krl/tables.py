@@ -166,7 +166,7 @@ class Toolpath(Table):
     spindle_rad_s: Floats = column(np.float64)
     """(n,) positive for M3."""
     tool: Ints32 = column(np.int32)
-    """(n,) tool in the spindle during the row; 0 = none named so far."""
+    """(n,) tool in the spindle during the row; 0 = nobody says which."""
     exact_stop: Bools = column(np.bool_)
     tolerance_mm: Floats = column(np.float64)
     """(n,) blend tolerance of ``G64 P``, NaN = none."""

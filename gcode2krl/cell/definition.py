@@ -107,7 +107,7 @@ class Cell(Section):
     """The machine tool that a five-axis program was made for."""
     tool: dict[ToolNumber, Tool] = Field(default_factory=dict)
     mounted_tool: Annotated[int, Field(strict=True, ge=1, le=99999)] | None = None
-    """The tool in the spindle when the program starts without a T word."""
+    """The tool in the spindle when a program starts, until its first M6."""
     frames: Frames = Frames.model_construct()
     work_offsets: dict[Annotated[str, Field(pattern=_WORK_OFFSET)], Frame] = Field(default_factory=dict)
     """Zeros of the program; a Fanuc's G54.1 P3 is ``G54.1P3``."""
@@ -171,6 +171,16 @@ class Cell(Section):
         True
         """
         return self.model_copy(update={**sections, "unconfirmed": self.unconfirmed})
+
+    @property
+    def usual_tool(self) -> int | None:
+        """The mounted tool, else that of the smallest number; None where the cell has none.
+
+        >>> from gcode2krl import load_cell
+        >>> load_cell().usual_tool
+        1
+        """
+        return self.mounted_tool if self.mounted_tool is not None else min(self.tool, default=None)
 
     @property
     def clearance_z_mm(self) -> float | None:

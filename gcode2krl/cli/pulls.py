@@ -36,7 +36,7 @@ def write_form(
     from gcode2krl.identify.pulls import form, propose
 
     watch = watch_of(cell)
-    tool = cell.mounted_tool or min(cell.tool, default=0)
+    tool = cell.usual_tool or 0
 
     def gap(q_rad: Any) -> Any:
         assert watch is not None

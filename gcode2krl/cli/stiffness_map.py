@@ -125,9 +125,8 @@ class Case:
     @classmethod
     def of(cls, cell: "Cell", load: Three | None, feed: Three | None, tool: int | None) -> "Case":
         """Return the case of a command's options; raises `NotUnderstoodError` for an impossible option."""
-        number = tool if tool is not None else cell.mounted_tool
-        number = number if number is not None else min(cell.tool)
-        if number not in cell.tool:
+        number = tool if tool is not None else cell.usual_tool
+        if number is None or number not in cell.tool:
             known = ", ".join(f"T{name}" for name in sorted(cell.tool))
             raise input_error(
                 "tool-unknown", f"T{number} is not in the cell, which has {known}", "choose one"

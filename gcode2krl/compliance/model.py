@@ -139,7 +139,7 @@ def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
         If there is not one number for all or one a row.
     """
     if tool is None:
-        tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=0)
+        tool = cell.usual_tool or 0
     if np.ndim(tool) == 0:  # a cycle of the online side has no time to sort
         numbers, index = np.array([tool]), np.array(0)
     else:

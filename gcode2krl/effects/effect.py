@@ -123,6 +123,8 @@ class Effect:
     where: frozenset[Where] = frozenset()
     depends_on: frozenset[Dependence] = frozenset()
     """Of what it is a function; with ``where`` its family. Empty: not stated."""
+    feels_weight: bool = False
+    """Its size depends on weight and inertia of the links, as far as the cell states their masses."""
     is_nuisance: bool = False
     """Its usual size is at work in every run, the same in all, and a fit allows for it: see `disturbed`.
 

@@ -16,4 +16,7 @@ class MotorEffect(Effect):
         """Say that the gear ratio is missing."""
         if target not in JOINTS or target in self.targets(cell):
             return ""
-        return f"the gear ratio of {target} of {cell.robot.title} is not known: state robot.drives.gear_ratio"
+        return (
+            f"the gear ratio of {target} of {cell.robot.title} is not known: state robot.drives.gear_ratio, "
+            "N over D of $RAT_MOT_AX in the controller's $machine.dat (init --controller ARCHIVE reads it)"
+        )

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.compiled.core import OUT_BOOLS, OUT_FLOATS, OUT_INTS32, Struct, StructOf
+from gcode2krl.gcode.state import KNOWN_AXES
+from gcode2krl.units import RAD_PER_REV, S_PER_MIN
 
 _COLUMNS = {
     "position_mm": OUT_FLOATS,
@@ -37,11 +39,9 @@ _START = {
     "feed_mm_s": np.inf,
     "tolerance_mm": np.nan,
     "arc": -1,
-    "length_offset_mm": np.nan,
-    "length_offset_tool": -1,
     "time_s": np.nan,
 }
-"""What is not 0 in the row of the start point, from which nothing has moved."""
+"""What neither the state says nor 0 is in a row that stands before the first block."""
 ROWS = StructOf(**_COLUMNS)
 
 
@@ -53,8 +53,24 @@ class Columns:
         self._arrays = {name: self._empty(name, 0 if name in unused else room) for name in _COLUMNS}
         self.room = room
         self._filled = tuple(name for name in _COLUMNS if name not in unused)
-        for name in self._filled:
-            self._arrays[name][0] = _START.get(name, 0)
+
+    def begin(self, state: np.void) -> int:
+        """Write the row of the start point and, where the state has a place, one that goes there; return
+        how many."""
+        rows = 1 + all(state[known] for known in KNOWN_AXES)
+        length_mm = float(state["length_offset"])
+        of_state = {
+            "tool": state["tool"],
+            "spindle_rad_s": state["direction"] * state["rpm"] * RAD_PER_REV / S_PER_MIN,
+            "length_offset_mm": length_mm,
+            "length_offset_tool": state["offset_tool"],
+        }
+        for row in range(rows):
+            there = {"position_mm": [state[axis] for axis in "xyz"], "known": True} if row else {}
+            values = _START | of_state | there
+            for name in self._filled:
+                self._arrays[name][row] = values.get(name, 0)
+        return rows
 
     @staticmethod
     def _empty(name: str, room: int) -> NDArray[Any]:

@@ -36,7 +36,6 @@ MACHINE = StructOf(
     d_holds=INT,
     programs=INT,
     has_m61_to_m73=INT,
-    mounted_tool=INT,
     core_g=INTS32,
     dwell_by_letter=FLOATS,
     points=INT,
@@ -61,8 +60,8 @@ MACHINE = StructOf(
 
 ``offsets`` are those of `state.WORK_OFFSETS` (n, 4): X, Y, Z in mm, rotation about Z in degrees. G10
 writes to them, and to ``tool_length_mm`` by tool number, NaN where a tool is not declared. ``saved`` are the
-modes that M70 and M73 have saved, one row a level of calls. ``mounted_tool`` is the cell's, -1 where it
-states none. ``lead`` and ``d_holds`` are those of `dialect_marks`.
+modes that M70 and M73 have saved, one row a level of calls. ``lead`` and ``d_holds`` are those of
+`dialect_marks`.
 """
 
 run = core_function("gcode_run", MACHINE, BYTES, FLOATS, FLOATS, INTS32, INT, returns=INT)

@@ -177,6 +177,8 @@ def _asked(code: bytes, named: list[NamedTool], toolpath: Toolpath | None, diale
         asked.append("tool_change: what the robot does at M6")
     else:
         asked.append("mounted_tool: no M6 says which is in the spindle")
+    if not re.search(rb"M *0*[34](?!\d)", code, _FLAGS):
+        asked.append("[program.start] spindle_rpm: no M3 switches the spindle on")
     if not _LENGTH.search(code) and not re.search(rb"G *43|\bD *1\b", code, _FLAGS):
         asked.append('[program] tool_length = "from_table": nothing in the program selects a length')
     asked += [f"[work_offsets] {zero}" for zero in _offsets(code) if zero.startswith("G5") and zero != "G52"]

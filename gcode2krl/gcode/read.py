@@ -3,7 +3,7 @@
 import io
 import math
 import os
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
@@ -39,6 +39,7 @@ from gcode2krl.gcode.state import (
     EVENT_TOOL,
     GROUP_OF_G,
     IMPLIED_M5,
+    KNOWN_AXES,
     MODES,
     OF_CYCLE,
     WORK_OFFSETS,
@@ -205,6 +206,7 @@ def read_stream(
     interpreter = _Interpreter(
         name,
         spoken,
+        {} if cell is None else _at_start(cell, stated.length_mm if from_table else None),
         offsets=offsets,
         offset_known=offset_known,
         tool_length_mm=stated.length_mm,
@@ -213,7 +215,6 @@ def read_stream(
         chord_tolerance_mm=chord_tolerance_mm,
         block_delete=block_delete,
         lengths_from_table=from_table,
-        mounted_tool=_mounted_tool(cell),
         **_rotary_settings(cell),
     )
     read_pieces = pieces(stream, name)
@@ -269,14 +270,34 @@ def _of_cell(dialect: Dialect, cell: "Cell | None") -> Dialect:
     compensation."""
     if cell is None:
         return dialect
-    cutter, modes = cell.program.cutter, cell.program.start.model_dump(exclude_none=True)
-    start = {**dialect.start, **start_of(modes)}
+    cutter, start = cell.program.cutter, {**dialect.start, **start_of(cell.program.start.modes())}
     return replace(with_cutter(dialect, cutter.lead_in, cutter.d), start=start)
 
 
-def _mounted_tool(cell: "Cell | None") -> int:
-    """Return the tool that is in the spindle at the start, -1 where nobody says which."""
-    return -1 if cell is None or cell.mounted_tool is None else cell.mounted_tool
+def _at_start(cell: "Cell", table_mm: Floats | None) -> dict[str, float]:
+    """Return fields of the state for the machine as it stands at the start: tool, spindle, place of the tip.
+
+    With ``table_mm``, lengths by tool number, the length of the mounted tool is in force, as behind its M6.
+    """
+    start, state = cell.program.start, dict[str, float]()
+    if cell.mounted_tool is not None:
+        state["tool"] = cell.mounted_tool
+        if table_mm is not None:
+            length_mm = table_mm[cell.mounted_tool] if cell.mounted_tool < len(table_mm) else np.nan
+            state |= {"offset_tool": cell.mounted_tool, "length_offset": np.nan_to_num(length_mm)}
+    if start.spindle_rpm is not None:
+        state |= {"rpm": start.spindle_rpm, "direction": 1}
+    if start.position_mm is not None:
+        turned = any(frame.a_deg for frame in cell.work_offsets.values())
+        if turned or cell.machine is not None:
+            what = "a turned zero in [work_offsets]" if turned else "rotary axes in [machine]"
+            raise input_error(
+                "cell-key",
+                f"program.start.position_mm: with {what} it is not read",
+                "let the program begin with G0 and all axes",
+            )
+        state |= dict(zip("xyz", start.position_mm, strict=True)) | dict.fromkeys(KNOWN_AXES, 1)
+    return state
 
 
 def _rotary_settings(cell: "Cell | None") -> dict[str, int]:
@@ -335,14 +356,15 @@ def _work_offsets(cell: "Cell | None") -> tuple[Floats, Bools]:
 class _Interpreter:
     """Runs the compiled interpreter over pieces of words and collects what it writes."""
 
-    def __init__(self, name: str, spoken: Dialect, **settings: Any) -> None:
+    def __init__(self, name: str, spoken: Dialect, at_start: Mapping[str, float], **settings: Any) -> None:
+        """Begin with fields of the state as the machine stands ``at_start``."""
         self.name, self.spoken = name, spoken
         self.state, self.counts = initial_state(), np.zeros(1, dtype=COUNTS)
-        for key, value in spoken.start.items():
+        for key, value in (*spoken.start.items(), *at_start.items()):
             self.state[key] = value
         self.columns = Columns(_FIRST_ROWS, with_rotary=settings["rotary_axes"] != 0)
+        self.counts["rows"] = self.rows_at_start = self.columns.begin(self.state[0])
         self.chord_tolerance_mm = settings["chord_tolerance_mm"]
-        self.counts["rows"] = 1  # the start point
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
         self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
         self.machine: Any = machine.MACHINE(
@@ -396,7 +418,7 @@ class _Interpreter:
         Return the line from which on the program has to be read as a whole, None if all of it was executed.
         """
         found_before = self._count("findings")
-        if self._count("rows") == 1 and len(words.line):
+        if self._count("rows") == self.rows_at_start and len(words.line):
             lines = int(words.line[-1] - words.line[0]) + 1
             self._reserve(int(_ROOM * lines * max(1.0, size / len(text))))
         stopped_at = self._execute(words, text)

@@ -20,6 +20,7 @@ _OF_CHARACTER = {
     ")": "write ( before the comment, or remove the )",
 }
 """What to do about a character, where simply removing it would leave another mistake."""
+_SCALING_OFF, _REMOVE_G50 = 500, "remove G50, which ends a scaling: no G51 is read, so none is in force"
 SPIRAL_SENTENCE = (
     "{count} with radii that differ at start and end, most by {difference:.4f} mm "
     "({a:.4f} and {b:.4f} mm); read as a spiral"
@@ -86,6 +87,8 @@ def _texts(finding: FindingKind, a: float, b: float) -> tuple[str, str]:
         return f"{finding.name[-1]}{{g}} stands twice in the block", "keep one"  # it does not exclude itself
     if finding.name == "F.BAD_CHARACTER" and 0 < a < FIRST_FOREIGN:
         return finding.sentence, _OF_CHARACTER.get(chr(int(a)), finding.remedy)
+    if finding.name == "F.UNKNOWN_G" and a == _SCALING_OFF:
+        return finding.sentence, _REMOVE_G50
     return finding.sentence, finding.remedy
 
 

@@ -37,8 +37,7 @@ STATE = np.dtype(
         ("feed_of_other_unit", "f8"),  # the feed when G20 or G21 last changed the unit
         ("rpm", "f8"),
         ("direction", "i4"),  # 1 = M3, -1 = M4, 0 = off
-        ("tool", "i4"),
-        ("tool_stated", "i1"),  # by M6 or M61; before it the cell's mounted tool is in the spindle
+        ("tool", "i4"),  # in the spindle: the cell's mounted tool until M6; 0 = none
         ("selected_tool", "i4"),  # -1 = none yet
         ("selected_line", "i4"),  # where it was named
         ("length_offset", "f8"),  # NaN = G49
@@ -221,6 +220,8 @@ def initial_state() -> NDArray[np.void]:
     return state
 
 
+KNOWN_AXES = ("known_x", "known_y", "known_z")
+"""Fields of the state: whether an axis has a place that is stated."""
 AT_START = -1
 """Instead of a line: the control starts so."""
 

@@ -112,7 +112,7 @@ def other_tools(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Ite
     An error where both are sure: the comment names the tool, and a person has checked the cell's. A comment
     without a tool number counts where the program has one tool.
     """
-    used = {int(number) or (cell.mounted_tool or 0) for number in distinct(toolpath.tool[1:])}
+    used = {int(number) for number in distinct(toolpath.tool[1:])}
     used -= {0} if len(used) > 1 else set()
     only = next(iter(used)) if len(used) == 1 else 0
     told: set[int] = set()

@@ -115,7 +115,7 @@ def _load(measurements: Measurements, at: Ints, frames: Floats, cell: Cell) -> L
     if load.point_flange_mm is not None:
         point = np.array(load.point_flange_mm)
     else:
-        tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=None)
+        tool = cell.usual_tool
         if tool is None:
             raise input_error(
                 "measurement-key",

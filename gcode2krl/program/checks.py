@@ -213,7 +213,8 @@ def _undefined_positions(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterato
             int(toolpath.source_line[row]),
             f"feed move from a position whose {_named(missing)} has not been programmed: "
             + "; ".join(_why_unknown(toolpath, row, axis) for axis in missing),
-            "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too)",
+            "program X, Y and Z with G0 first (after G28, G53 and a change of G43 too), or state in the cell "
+            "where the tip stands at the start: [program.start] position_mm",
         )
 
 
@@ -282,7 +283,7 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             "spindle-off",
             int(toolpath.source_line[row]),
             f"feed move with the spindle off{_why_off(toolpath, row)}",
-            "program S and M3 before it",
+            "program S and M3 before it; switched by hand: [program.start] spindle_rpm in the cell",
         )
     tapping = {int(event.values["line"]): event.values["cycle"] for event in toolpath.events if _taps(event)}
     yield from _tapping(tapping)
@@ -294,9 +295,13 @@ def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             "feed move with the spindle turning left (M4)",
             "the tools of the cell cut with M3",
         )
+    by_hand_rpm = cell.program.start.spindle_rpm
+    if by_hand_rpm is not None:
+        yield from _spindle_speed(by_hand_rpm, 0, 0, toolpath, cell)
     for event in toolpath.events:
         if event.kind == "spindle":
-            yield from _spindle_speed(event, toolpath, cell)
+            rpm, line = abs(event.values["rpm"]), int(event.values["line"])
+            yield from _spindle_speed(rpm, event.row, line, toolpath, cell)
 
 
 def _taps(event: Event) -> bool:
@@ -326,20 +331,13 @@ def _why_off(toolpath: Toolpath, row: int) -> str:
     return f": it was stopped by {'M6' if values.get('implied') else 'M5'} in line {values['line']}"
 
 
-def _spindle_speed(event: Event, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
-    tool = cell.tool.get(int(toolpath.tool[min(event.row + 1, len(toolpath) - 1)]))
+def _spindle_speed(rpm: float, row: int, line: int, toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
+    tool = cell.tool.get(int(toolpath.tool[min(row + 1, len(toolpath) - 1)]))
     stated = (cell.spindle.max_rpm, tool.max_rpm if tool is not None else None)
     most = min((rpm for rpm in stated if rpm is not None), default=np.inf)
-    rpm = abs(event.values["rpm"])
     if rpm > most * (1 + 1e-9):
         sentence = f"S{rpm:.0f} is above the {most:.0f} rpm that spindle and tool allow"
-        yield Issue(
-            "error",
-            "spindle-speed",
-            int(event.values["line"]),
-            sentence,
-            "lower S, or correct max_rpm in the cell",
-        )
+        yield Issue("error", "spindle-speed", line, sentence, "lower S, or correct max_rpm in the cell")
 
 
 def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
@@ -351,7 +349,7 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             int(toolpath.source_line[row]),
             f"feed {toolpath.feed_mm_s[row] * S_PER_MIN:.0f} mm/min is above the largest path speed, "
             f"{most_mm_s * S_PER_MIN:.0f} mm/min",
-            "check F and the unit (G20/G21)",
+            "check F and the unit (G20/G21); where F asks for all that the machine can, write at most that",
         )
     for row in _stretches(feed & (toolpath.feed_mm_s > 0) & (toolpath.feed_mm_s < _SLOWEST_MM_S)):
         yield Issue(
@@ -369,7 +367,9 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    other = feed & (toolpath.tool > 0) & (toolpath.length_offset_tool != toolpath.tool)
+    offset = toolpath.length_offset_tool
+    touched_off = np.arange(len(toolpath)) <= _first_change(toolpath)  # with the mounted tool
+    other = feed & (toolpath.tool > 0) & (offset != toolpath.tool) & ~(touched_off & (offset < 0))
     for row in _stretches(other):
         number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
         tool = cell.tool.get(number)
@@ -409,8 +409,18 @@ def _clearance(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
+    moves = toolpath.is_position() & ~toolpath.machine
+    first = int(np.argmax(moves))
+    if moves[first] and toolpath.tool[first] > 0 and first <= _first_change(toolpath):
+        yield Issue(
+            "warning",
+            "tool-assumed",
+            int(toolpath.source_line[first]),
+            f"no tool has been named (T… M6); tool {toolpath.tool[first]} is taken as mounted",
+            "program T and M6",
+        )
     for number in used_tools(toolpath):
-        row = int(np.argmax(toolpath.is_position() & ~toolpath.machine & (toolpath.tool == number)))
+        row = int(np.argmax(moves & (toolpath.tool == number)))
         line = int(toolpath.source_line[row])
         for event in toolpath.events:
             if event.kind == "tool" and event.values["tool"] == number:
@@ -418,7 +428,7 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
                 break
         if number == 0:
             emptied = any(event.kind == "tool" and event.values["tool"] == 0 for event in toolpath.events)
-            yield from _no_tool(cell, line, emptied)
+            yield from _no_tool(line, emptied)
         elif number not in cell.tool:
             yield Issue(
                 "error",
@@ -439,27 +449,23 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
             )
 
 
-def _no_tool(cell: Cell, line: int, emptied: bool) -> Iterator[Issue]:
-    mounted = cell.mounted_tool
+def _first_change(toolpath: Toolpath) -> int:
+    """Return the row of the first tool change; the cell's mounted tool is in the spindle up to it."""
+    return min((event.row for event in toolpath.events if event.kind == "tool"), default=len(toolpath))
+
+
+def _no_tool(line: int, emptied: bool) -> Iterator[Issue]:
     if emptied:
         yield Issue(
             "error", "tool-missing", line, "moves with an empty spindle (T0 M6)", "change to a tool first"
         )
-    elif mounted is None or mounted not in cell.tool:
+    else:
         yield Issue(
             "error",
             "tool-missing",
             line,
             "no tool has been named (T… M6), and the cell does not say which is mounted",
             "program T and M6, or give mounted_tool in the cell",
-        )
-    else:
-        yield Issue(
-            "warning",
-            "tool-assumed",
-            line,
-            f"no tool has been named (T… M6); tool {mounted} is taken as mounted",
-            "program T and M6",
         )
 
 
@@ -486,7 +492,7 @@ def _silent_changes(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
     from gcode2krl.cell.m_codes import silent_changes
 
     silent = set(silent_changes(cell, sorted({event.values["tool"] for event in changes})))
-    in_spindle = cell.mounted_tool
+    in_spindle = int(toolpath.tool[0]) or None
     for event in changes:
         number = event.values["tool"]
         if number not in silent:

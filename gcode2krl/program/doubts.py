@@ -251,7 +251,7 @@ def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Iss
         & (toolpath.feed_mm_s > 0.0)
     )
     for number in np.unique(toolpath.tool[turning]).tolist():
-        tool = cell.tool.get(number if number else cell.mounted_tool or 0)
+        tool = cell.tool.get(number)
         rows = np.flatnonzero(turning & (toolpath.tool == number))
         rows = rows[(toolpath.position_mm[rows] != toolpath.position_mm[rows - 1]).any(axis=1)]
         if tool is None or not len(rows):

@@ -91,11 +91,10 @@ class Route:
         self._join()
 
     def _frame_tool(self, number: int) -> int:
-        """Return the tool whose frame moves: an unknown or unnamed tool moves as the mounted one."""
-        if number in self.cell.tool:
-            return number
-        mounted = self.cell.mounted_tool
-        return mounted if mounted in self.cell.tool and mounted is not None else min(self.cell.tool)
+        """Return the tool whose frame moves: an unknown or unnamed tool moves as the usual one."""
+        usual = self.cell.usual_tool
+        assert usual is not None  # `require_geometry`
+        return number if number in self.cell.tool else usual
 
     # --- the walk -------------------------------------------------------------------------------------
 
@@ -110,7 +109,8 @@ class Route:
         stops = sorted(
             {0, len(toolpath), *np.flatnonzero(np.diff(plain)) + 1, *(row + 1 for row, _ in changes)}
         )
-        first_tool = next((toolpath.events[index].values["tool"] for row, index in changes if row == 0), 0)
+        at_start = (toolpath.events[index].values["tool"] for row, index in changes if row == 0)
+        first_tool = next(at_start, int(toolpath.tool[0]))
         self.tool = self._frame_tool(first_tool)
         self._home(-1)
         for start, end in itertools.pairwise(stops):

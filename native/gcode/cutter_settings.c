@@ -50,7 +50,7 @@ static void refuse_behind_compensation(Block *b) {
 
 /* Find the diameter for G41 and G42: that of tool D, or of the tool in the spindle; NaN after a report. */
 static double tool_diameter(Block *b, int32_t code) {
-    const int32_t there = tool_in_spindle(b->machine);
+    const int32_t there = b->state->tool;
     int32_t tool = there;
     if (b->has[V_WORD_D]) {
         tool = whole(b->word[V_WORD_D]);
@@ -71,7 +71,7 @@ static double tool_diameter(Block *b, int32_t code) {
 
 /* Find the diameter that a Fanuc's D stands for: the offset of the tool in the spindle, whose number it has. */
 static double offset_diameter(Block *b) {
-    const int32_t there = tool_in_spindle(b->machine), d = b->state->cutter_d;
+    const int32_t there = b->state->tool, d = b->state->cutter_d;
     if (d == 0)
         return 0.0;
     if (d != there) {
@@ -94,7 +94,7 @@ static double diameter(Block *b, int32_t code) {
 
 /* Keep a diameter that is not that with which the tool in the spindle cuts, until a move is made with it. */
 static void compare_with_tool(Block *b, double diameter_mm) {
-    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, tool_in_spindle(b->machine));
+    const double in_cell_mm = of_tool(b->machine->cutter_diameter_mm, b->state->tool);
     if (fabs(diameter_mm - in_cell_mm) > OTHER_DIAMETER_MM)
         b->state->cutter_other_mm[0] = diameter_mm, b->state->cutter_other_mm[1] = in_cell_mm;
 }

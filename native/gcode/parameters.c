@@ -47,10 +47,10 @@ static double of_work_offset(const Machine *machine, int64_t number) {
     return system < SYSTEMS && column <= 3 && (axis < 3 || column != axis) ? CELL(machine->offsets, system, column) : 0.0;
 }
 
-/* Return the diameter of the tool that the program has changed to, in mm; NaN where it is not declared, or in inches. */
+/* Return the diameter of the tool in the spindle, in mm; NaN where it is not declared, or in inches. */
 static double diameter_in_spindle(const Machine *machine) {
     const State *s = machine->state.at;
-    return s->tool_stated && s->unit_mm == 1.0 ? diameter_of(machine, s->tool) : NAN;
+    return s->unit_mm == 1.0 ? diameter_of(machine, s->tool) : NAN;
 }
 
 /* Return one of #5161 to #5428, which show the state of the machine. */

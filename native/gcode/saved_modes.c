@@ -62,7 +62,7 @@ static double length_brought_back(const Block *b, const Modes *saved) {
     const double now_mm = b->state->length_offset;
     if (isnan(saved->length_offset) || !isnan(now_mm))
         return isnan(saved->length_offset) ? NAN : now_mm;
-    const double own_mm = length_of(b->machine, tool_in_spindle(b->machine));
+    const double own_mm = length_of(b->machine, b->state->tool);
     return isnan(own_mm) ? 0.0 : own_mm;
 }
 
@@ -122,7 +122,7 @@ static void restore_length(Block *b, const Modes *saved) {
         return;
     if (isnan(s->length_offset) != isnan(saved->length_offset)) {
         set_length_offset(s, saved->length_offset);
-        s->offset_tool = isnan(saved->length_offset) ? -1 : tool_in_spindle(b->machine);
+        s->offset_tool = isnan(saved->length_offset) ? -1 : b->state->tool;
     }
     s->length_code = saved->length_code;
 }
@@ -171,14 +171,10 @@ void set_tool_number(Block *b) {
         s->doubt |= S_DOUBT_TOOL;
         return;
     }
-    const int32_t there = tool_in_spindle(b->machine);
-    if (tool != there) {
-        report(b, FM_TOOL_NUMBER, (Says){.a = tool, .b = there});
+    if (tool != s->tool) {
+        report(b, FM_TOOL_NUMBER, (Says){.a = tool, .b = s->tool});
         s->doubt |= S_DOUBT_TOOL;
-        return;
     }
-    s->tool = tool;
-    s->tool_stated = 1;
 }
 
 /* Tell whether another code of the block takes a word of an output; else report it. */

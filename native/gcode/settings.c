@@ -78,7 +78,6 @@ static void change_tool(Block *b) {
     }
     stand_beside(s);
     s->tool = s->selected_tool;
-    s->tool_stated = 1;
     event(b, S_EVENT_TOOL, s->tool, 0.0);
     double length_mm = length_of(b->machine, s->tool);
     if (s->tool > 0 && isnan(length_mm)) {
@@ -94,7 +93,7 @@ static void change_tool(Block *b) {
 /* G43, with H or for the tool in the spindle. */
 static void apply_length(Block *b) {
     State *s = b->state;
-    const int32_t there = tool_in_spindle(b->machine);
+    const int32_t there = b->state->tool;
     int32_t tool = there;
     if (b->has[V_WORD_H]) {
         b->used[V_WORD_H] = true;

@@ -13,15 +13,6 @@ double length_of(const Machine *machine, int32_t tool) {
     return tool >= 0 && tool < machine->tool_length_mm.rows ? AT(machine->tool_length_mm, tool) : NAN;
 }
 
-/* Return the tool in the spindle: until the program changes it, the one that the cell says is mounted, unless a T
-   names another. */
-int32_t tool_in_spindle(const Machine *machine) {
-    const State *s = machine->state.at;
-    const int32_t mounted = (int32_t)machine->mounted_tool;
-    const bool other_named = s->selected_tool >= 0 && s->selected_tool != mounted;
-    return s->tool_stated || mounted <= 0 || other_named ? s->tool : mounted;
-}
-
 /* G43, G49: the machine stands still, so the tip's coordinate moves by the difference. */
 void set_length_offset(State *s, double length_mm) {
     const double old = length_offset_of(s), new = isnan(length_mm) ? 0.0 : length_mm;
@@ -56,7 +47,7 @@ static bool is_along_tool(Block *b) {
 
 /* The length in force is given by the program for the tool in the spindle. */
 static void take_length(Block *b, double length_mm) {
-    const int32_t tool = tool_in_spindle(b->machine);
+    const int32_t tool = b->state->tool;
     report_other_length(b, tool, length_mm);
     set_length_offset(b->state, length_mm);
     b->state->offset_tool = tool;

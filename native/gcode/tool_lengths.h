@@ -6,7 +6,6 @@
 #include "gcode/block.h"
 
 double length_of(const Machine *machine, int32_t tool);
-int32_t tool_in_spindle(const Machine *machine);
 void set_length_offset(State *s, double length_mm);
 void length_by_words(Block *b);
 void length_added(Block *b);

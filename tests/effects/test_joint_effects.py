@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gcode2krl import robot
+from gcode2krl import load_cell, predict, robot
 from gcode2krl.compliance import deflection_of
 from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
@@ -295,3 +295,16 @@ def test_a_joint_slips_each_time_its_torque_is_large(swinging, known):
     np.testing.assert_allclose(
         (signals.q_load_rad - swinging.q_cmd_rad)[:, 4], 0.01 * DEG * np.cumsum(steps), atol=1e-12
     )
+
+
+def test_an_effect_that_feels_the_weight_says_that_it_is_not_known(tmp_path):
+    part = tmp_path / "part.ngc"
+    part.write_text(
+        "G21 G90 G17\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F600\nX9\nG0 Z50\nM2\n", "utf-8"
+    )
+    known, twist = load_cell(), "gear_twist:target=A2,deg_per_kNm=0.01"
+    drives = known.robot.drives.model_copy(update={"link_mass_kg": None})
+    unknown = known.model_copy(update={"robot": known.robot.model_copy(update={"drives": drives})})
+    for cell, found in ((known, []), (unknown, ["effect-weightless"])):
+        issues = predict(part, cell, effects=[twist]).issues
+        assert [issue.code for issue in issues if issue.code == "effect-weightless"] == found

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from gcode2krl.cell.sections.fields import Finite, OneLine, Positive, Section
+from gcode2krl.cell.sections.surroundings import Point
 from gcode2krl.cell.template_rules import external_problem
 
 # Only variables of sensors, or the integrator's own: never one of the planner, a frame or an output.
@@ -35,7 +36,10 @@ _EXTERNAL = r"^[A-Za-z][A-Za-z0-9_]{0,23} ?\([A-Za-z0-9_ :,\[\]]*\)$"
 
 
 class Start(Section):
-    """Modes in which the control starts a program, for programs that do not name them."""
+    """How the machine stands and in which modes its control is when a program starts that does not say so.
+
+    The tool that is mounted then is `Cell.mounted_tool`.
+    """
 
     motion: Literal["G0", "G1"] | None = None
     plane: Literal["G17", "G18", "G19"] | None = None
@@ -43,6 +47,14 @@ class Start(Section):
     distance: Literal["G90", "G91"] | None = None
     feed: Literal["G94", "G95"] | None = None
     retract: Literal["G98", "G99"] | None = None
+    spindle_rpm: Positive | None = None
+    """Of a spindle that is switched by hand: the program halts until a person has seen it turn."""
+    position_mm: Point | None = None
+    """Where the tip stands, in ``$BASE``: the program goes there first."""
+
+    def modes(self) -> dict[str, str]:
+        """Return the modes that are stated, G-codes by their group: ``{"distance": "G90"}``."""
+        return self.model_dump(exclude_none=True, exclude={"spindle_rpm", "position_mm"})
 
 
 class Cutter(Section):

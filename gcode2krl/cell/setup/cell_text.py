@@ -111,11 +111,23 @@ class _Writer:
             yield from self._said(
                 "$VEL_AXIS_MA over $RAT_MOT_AX", bool(self.is_of_archive.get("speeds_deg_s"))
             )
+        yield from self._drives()
         rated = (("mass_kg", "payload_kg"), ("reach_mm", "reach_mm"))
         stated = [(key, self.answers[asked]) for key, asked in rated if self.answers.get(asked)]
         if stated:
             yield from ("", "[robot.payload]", *(f"{key} = {_number(value)}" for key, value in stated))
             yield from self._said("", False)
+
+    def _drives(self) -> Iterator[str]:
+        """Write what nobody is asked for: ratios of an archive, masses of a URDF."""
+        ratios, masses = self.controller.gear_ratio, self.controller.link_mass_kg
+        if ratios is None and masses is None:
+            return
+        yield from ("", "[robot.drives]")
+        for key, numbers in (("gear_ratio", ratios), ("link_mass_kg", masses)):
+            if numbers is not None:
+                yield f"{key} = {toml_value([round(number, 4) for number in numbers])}"
+        yield from self._said("$RAT_MOT_AX", True)
 
     def _controller(self) -> Iterator[str]:
         kss = self.answers.get("kss", UNKNOWN)

@@ -296,6 +296,8 @@ class ArchivedController:
     """a1, a2, c1, c2, c3, c4 of the arm."""
     limits_deg: tuple[tuple[float, float], ...] | None = None
     speeds_deg_s: Numbers | None = None
+    gear_ratio: Numbers | None = None
+    link_mass_kg: Numbers | None = None
     robroot: Numbers | None = None
     home_deg: Numbers | None = None
     tools: tuple[NamedFrame, ...] = ()
@@ -321,6 +323,7 @@ def read_controller(path: Path) -> ArchivedController:
             lengths_mm=arm.lengths_mm,
             limits_deg=arm.limits_deg,
             speeds_deg_s=arm.speeds_deg_s,
+            link_mass_kg=arm.link_mass_kg,
             is_description=True,
         )
     lists = read_archive(path)
@@ -343,7 +346,8 @@ def controller_of(values: Mapping[str, Value], source: str) -> ArchivedControlle
         model=_model(_machine_name(values), trafo_name, lengths),
         lengths_mm=lengths,
         limits_deg=_limits(values),
-        speeds_deg_s=_speeds(values),
+        speeds_deg_s=_six(_speed_of(values, axis) for axis in range(1, 7)),
+        gear_ratio=_six(_ratio_of(values, axis) for axis in range(1, 7)),
         robroot=_members(values.get("$ROBROOT"), FRAME_KEYS),
         home_deg=_members(values.get("XHOME"), _AXES) or _members(values.get("$H_POS"), _AXES),
         tools=_named(values, "TOOL"),
@@ -398,19 +402,22 @@ def _limits_of(values: Mapping[str, Value], axis: int) -> tuple[float, float] | 
     return None if low is None or high is None or low >= high else (low, high)
 
 
-def _speeds(values: Mapping[str, Value]) -> Numbers | None:
-    speeds = [_speed_of(values, axis) for axis in range(1, 7)]
-    known = [speed for speed in speeds if speed is not None]
-    return tuple(known) if len(known) == len(speeds) else None
+def _six(stated: Iterable[float | None]) -> Numbers | None:
+    known = [number for number in stated if number is not None]
+    return tuple(known) if len(known) == len(_AXES) else None
+
+
+def _ratio_of(values: Mapping[str, Value], axis: int) -> float | None:
+    """Return the turns of a motor for one of its joint; their sign says only how the motor is mounted."""
+    ratio = _members(values.get(f"$RAT_MOT_AX[{axis}]"), ("N", "D"))
+    return abs(ratio[0] / ratio[1]) if ratio is not None and all(ratio) else None
 
 
 def _speed_of(values: Mapping[str, Value], axis: int) -> float | None:
     """Return the largest speed of a joint in deg/s: that of its motor in rpm over the ratio of its gear."""
     motor_rpm = _number(values.get(f"$VEL_AXIS_MA[{axis}]"))
-    ratio = _members(values.get(f"$RAT_MOT_AX[{axis}]"), ("N", "D"))
-    if not motor_rpm or ratio is None or not all(ratio):
-        return None
-    return round(abs(motor_rpm * ratio[1] / ratio[0]) * _DEG_S_PER_RPM, 1)
+    ratio = _ratio_of(values, axis)
+    return round(abs(motor_rpm) / ratio * _DEG_S_PER_RPM, 1) if motor_rpm and ratio else None
 
 
 def _externals(values: Mapping[str, Value]) -> Iterator[ExternalData]:

@@ -513,7 +513,7 @@ MACHINE_QUESTIONS = (
     ),
     CellQuestion(
         "mounted_tool",
-        "Tool that is in the spindle when a program starts without a T word; empty: none",
+        "Tool that is in the spindle when a program starts, until its first M6; empty: none",
         "look into the spindle",
         "whole",
         1,

@@ -1,4 +1,4 @@
-"""Lengths, limits and speeds of an arm from its URDF or xacro file, whatever pose its zeros describe.
+"""Lengths, limits, speeds and masses of an arm from its URDF or xacro file, whatever pose its zeros describe.
 
 Six turning axes as lines in the room say everything: how far axis 2 is from axis 1, axis 3 from axis 2,
 where axes 4 to 6 meet, and where the flange is. KUKA's angles at the file's zeros follow from the directions
@@ -45,6 +45,8 @@ class DescribedArm:
     limits_deg: tuple[tuple[float, float], ...] | None
     """In KUKA's angles."""
     speeds_deg_s: tuple[float, ...] | None
+    link_mass_kg: tuple[float, ...] | None = None
+    """Of the links that A1 to A6 move; None where they are missing, or placeholders: all alike."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,8 @@ def read_arm(file: Path) -> DescribedArm:
         if b"<!DOCTYPE" in text:
             raise _refused(file, "it declares a document type")
         root = ElementTree.fromstring(text)
-        joints = list(_joints(root))
+        values = _properties(root)
+        joints, mass_kg = list(_joints(root, values)), _masses(root, values)
     except OSError as error:
         raise _refused(file, f"cannot read: {error.strerror}") from None
     except (
@@ -94,8 +97,13 @@ def read_arm(file: Path) -> DescribedArm:
         ]
         limits_deg = tuple((round(low, 3) + 0.0, round(high, 3) + 0.0) for low, high in degrees)
     known = [round(math.degrees(speed), 3) for speed in speeds if speed]
+    masses = [mass_kg.get(joint.child, 0.0) for joint in turning]
     return DescribedArm(
-        root.get("name") or file.stem, lengths, limits_deg, tuple(known) if len(known) == 6 else None
+        root.get("name") or file.stem,
+        lengths,
+        limits_deg,
+        tuple(known) if len(known) == 6 else None,
+        tuple(masses) if len(set(masses)) > 1 and min(masses[:4]) > 0.0 else None,
     )
 
 
@@ -103,8 +111,7 @@ def _refused(file: Path, why: str) -> NotUnderstoodError:
     return input_error("urdf", why, "name the URDF or the macro file of one six-axis arm", source=str(file))
 
 
-def _joints(root: ElementTree.Element) -> Iterator[_Joint]:
-    """Yield the joints of a URDF, those in macros too, with the numbers that expressions stand for."""
+def _properties(root: ElementTree.Element) -> dict[str, float]:
     values = {"pi": math.pi}
     for element in root.iter():
         if element.tag.endswith("}property") and "value" in element.attrib:
@@ -112,6 +119,21 @@ def _joints(root: ElementTree.Element) -> Iterator[_Joint]:
                 values[element.attrib["name"]] = _number(element.attrib["value"], values)
             except (ValueError, KeyError, SyntaxError):
                 continue  # no number: a name or a block
+    return values
+
+
+def _masses(root: ElementTree.Element, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the masses that the links' inertials state, in kg."""
+    found = {_plain(link.get("name", "")): link.find("inertial/mass") for link in root.iter("link")}
+    return {
+        name: round(_number(mass.get("value", ""), values), 3)
+        for name, mass in found.items()
+        if mass is not None
+    }
+
+
+def _joints(root: ElementTree.Element, values: Mapping[str, float]) -> Iterator[_Joint]:
+    """Yield the joints of a URDF, those in macros too, with the numbers that expressions stand for."""
     for element in root.iter("joint"):
         if element.find("parent") is None or element.find("child") is None:
             continue  # of a controller's description

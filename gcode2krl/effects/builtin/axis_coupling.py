@@ -22,6 +22,7 @@ class AxisCoupling(Effect):
     links = frozenset({"gear"})
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.PLACE, Dependence.FORCE_BY_PLACE})
+    feels_weight = True
     parameters = (
         Parameter(
             name="ratio",

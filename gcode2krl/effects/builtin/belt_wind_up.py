@@ -25,6 +25,7 @@ class BeltWindUp(Effect):
     links = frozenset({"gear"})
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.OWN_TORQUE})
+    feels_weight = True
     parameters = (
         size_from_zero(
             "deg_per_kNm",

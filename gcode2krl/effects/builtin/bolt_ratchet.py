@@ -52,6 +52,7 @@ class BoltRatchet(_Ratchet):
 
     where = frozenset({Where.TIP})
     depends_on = frozenset({Dependence.RUN_TIME_STEP, Dependence.FORCE})
+    feels_weight = True
     vectors = MappingProxyType({"direction": DIRECTION})
     direction = DIRECTION
     parameters = (
@@ -97,6 +98,7 @@ class JointRatchet(_Ratchet):
 
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.RUN_TIME_STEP, Dependence.OWN_TORQUE})
+    feels_weight = True
     parameters = (
         size_from_zero(
             "step_deg",

@@ -24,6 +24,7 @@ class GearTwist(Effect):
     is_misread = True
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.OWN_TORQUE})
+    feels_weight = True
     targets = staticmethod(every_joint)
     parameters = (
         size_from_zero(

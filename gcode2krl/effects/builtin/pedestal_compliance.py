@@ -27,6 +27,7 @@ class PedestalCompliance(Effect):
     links = frozenset({"mechanics"})
     where = frozenset({Where.TIP})
     depends_on = frozenset({Dependence.FORCE_BY_PLACE, Dependence.PLACE, Dependence.ACCELERATION})
+    feels_weight = True
     parameters = (
         *(
             size_from_zero(

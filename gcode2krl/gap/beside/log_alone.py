@@ -53,7 +53,7 @@ def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | N
     between = cubic(time_s, table.time_s, logged)
     q = np.stack([play(column, width) for column, width in zip(between.T, still, strict=True)], axis=1)
     count = len(q)
-    tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=1)
+    tool = cell.usual_tool or 1
     kinematic = known_robot and run.head.angles == "absolute" and bool(np.isfinite(path).all())
     position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     if kinematic:

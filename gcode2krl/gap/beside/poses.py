@@ -20,7 +20,7 @@ def pose_pair(run: Run, number: int, cell: Cell, hours: float, known_robot: bool
     table = run.poses
     if table is None:
         raise ValueError("a run of poses has a table of them")
-    tool = cell.mounted_tool if cell.mounted_tool is not None else min(cell.tool, default=1)
+    tool = cell.usual_tool or 1
     count = len(table)
     position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     if known_robot and run.head.angles == "absolute":

@@ -59,6 +59,7 @@ def test_robot_frames_load_home_and_mounting_are_read(tmp_path, hanging, write):
     assert found.lengths_mm == tuple(geometry.array())
     assert found.limits_deg == hanging.robot.limits.q_deg
     assert found.speeds_deg_s == pytest.approx(hanging.robot.speeds.qd_deg_s, abs=0.05)
+    assert found.gear_ratio == pytest.approx([1798 / 7] * 6)
     assert found.robroot == (0.0, 0.0, 2600.0, 0.0, 0.0, 180.0)
     assert found.home_deg == hanging.home.q_deg
     assert [(one.number, one.name, one.frame) for one in found.tools] == [

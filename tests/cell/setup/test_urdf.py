@@ -128,3 +128,16 @@ def test_an_arm_of_no_library_becomes_a_cell_and_a_program(run, tmp_path):
     (tmp_path / "part.nc").write_text(GOOD.format(x=50), encoding="ascii")
     written = run("part.nc", "--cell", "cell.toml", "-o", "PART.src")
     assert written.code == 0, written.err
+
+
+@pytest.mark.parametrize(
+    ("placeholder", "read"), [(False, (80.0, 70.0, 60.0, 50.0, 40.0, 30.0)), (True, None)]
+)
+def test_masses_are_those_of_the_moving_links_and_placeholders_are_none(tmp_path, placeholder, read):
+    links = [
+        f'<link name="${{prefix}}{name}"><inertial><mass value="{2.0 if placeholder else 90.0 - 10.0 * n}"/>'
+        "</inertial></link>"
+        for n, name in enumerate(LINKS[:7])
+    ]
+    assert read_arm(file_of(tmp_path, [*links, *stretched(KR)])).link_mass_kg == read
+    assert read_arm(file_of(tmp_path, stretched(KR))).link_mass_kg is None
