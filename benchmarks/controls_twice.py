@@ -20,9 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from gcode2krl import Gcode2KrlError, read_gcode
 from gcode2krl.gcode.origin import control_of
 from tests.cells import over_demonstration
-from tests.reference import controls
+from tests.reference import contour, controls
 
-_TOOLS = {n: {"diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0} for n in range(1, 100)}
+_RADIUS_MM = 3.0
+_TOOLS = {n: {"diameter_mm": 2 * _RADIUS_MM, "teeth": 2, "length_mm": 60.0} for n in range(1, 100)}
 _CUTTER = {"program": {"cutter": {"lead_in": "a", "d": "radius"}}}
 _FIRST = over_demonstration({"tool": _TOOLS})
 _NAMED_TOOL = re.compile(r'\bT\s*=\s*"([^"]+)"|TOOL CALL "([^"]+)"')
@@ -74,12 +75,12 @@ def text_of(path):
 def compared(path, dialect, toolpath, search):
     """Return what comparing a reading with the other one says."""
     near = {p.stem.upper(): text_of(p) for folder in search for p in folder.glob("*.[sS][pP][fF]")}
-    beside = {"programs": near} if dialect == "sinumerik" else {}
+    beside = {"fanuc": {}, "sinumerik": {"programs": near, "radius": _RADIUS_MM}, "heidenhain": {"radius": _RADIUS_MM}}
     try:
-        theirs = controls.READERS[dialect](text_of(path), **beside)
+        theirs = controls.READERS[dialect](text_of(path), **beside[dialect])
     except controls.Unknown as unknown:
         return f"not compared ({str(unknown)[:40]})"
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, contour.OffPathError) as error:
         return f"not compared ({type(error).__name__})"
     found = controls.difference(controls.columns(places(toolpath)), controls.columns(theirs))
     return "same" if found is None else f"DIFFERS at {found}"

@@ -2,16 +2,16 @@
 plain Python.
 
 Nothing of the package is used. Only places are worked out: of moves, arcs' ends, drilled holes, subprograms,
-jumps and loops, in G17, without compensation of the cutter and without rotary axes. `columns` makes of
-places what
-two readings can be compared by: at each X and Y the lowest, highest and last Z, as the strokes of a hole
-differ by
-parameters. What this does not know raises `Unknown`, and the program is not compared.
+jumps and loops, in G17, without rotary axes; beside a compensated contour, at one height, by `contour`. `columns`
+makes of places what two readings can be compared by: at each X and Y the lowest, highest and last Z, as the
+strokes of a hole differ by parameters. What this does not know raises `Unknown`, and the program is not compared.
 """
 
 import functools
 import math
 import re
+
+from tests.reference import contour
 
 MOST_PLACES, SAME_MM = 2_000_000, 1e-7
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -53,7 +53,10 @@ def difference(ours, theirs, within_mm=1e-6):
 
 
 class _Machine:
-    def __init__(self):
+    def __init__(self, radius=None):
+        """Take the radius of every tool, None where it is not known."""
+        self.radius, self.side, self.corners = radius, 0, "arc"
+        self.elements, self.roundings, self.is_led, self.corner = [], [], False, None
         self.at = {"X": None, "Y": None, "Z": None}
         self.places, self.absolute, self.unit = [], True, 1.0
         self.shift = {"X": 0.0, "Y": 0.0, "Z": 0.0}
@@ -71,6 +74,51 @@ class _Machine:
         if self.at[axis] is None:
             raise Unknown("counted from nowhere")
         return self.at[axis] + value
+
+    def switch(self, side):
+        """Begin a compensated contour on a side, 1 left of it, or end it with 0."""
+        if side and self.radius is None:
+            raise Unknown("radius of the tool")
+        if side == self.side:
+            return
+        if self.elements:
+            path = contour.tool_path(self.elements, self.side, self.radius, self.corners, self.roundings)
+            self.places += [(p.real, p.imag, self.at["Z"]) for p in path]
+        self.elements, self.roundings, self.is_led, self.side = [], [], False, side
+
+    def move(self, to, centre=None, turn=0, corner=None, feeds=True):
+        """Go to where axes lead, straight or by an arc; ``corner`` is what is made behind this move."""
+        before = dict(self.at)
+        here = None if None in (before["X"], before["Y"]) else complex(before["X"], before["Y"])
+        after = {**before, **to}
+        across = here is not None and None not in (after["X"], after["Y"]) and here != complex(after["X"], after["Y"])
+        if self.side and (across or turn) and not self.is_led:
+            if turn or corner:
+                raise Unknown("an arc or a corner leads in")
+            self.is_led = True
+        elif self.side and self.is_led:
+            if not (across or turn) or "Z" in to:
+                raise Unknown("a move along the tool beside a contour")
+            self.elements.append((here, complex(after["X"], after["Y"]), centre, turn))
+            self.roundings.append(corner)
+        elif corner or self.corner:
+            self._round(here, complex(after["X"], after["Y"]), turn, corner, feeds)
+        elif not self.side or not self.elements:
+            self.go(**to)
+        self.at = after
+
+    def _round(self, here, there, turn, corner, feeds):
+        if turn or not feeds:
+            raise Unknown("a corner beside an arc or a rapid")
+        if self.corner:
+            before, kind, value = self.corner
+            made = contour.rounded([before, contour.line(here, there)], [(kind, value), None])
+            for element in made[1:]:
+                self.go(X=element[0].real, Y=element[0].imag)
+            here = made[-1][0]
+        self.corner = (contour.line(here, there), *corner) if corner else None
+        if not corner:
+            self.go(X=there.real, Y=there.imag)
 
     def hole(self, approach, bottom, leave):
         for z in (approach, bottom, leave):
@@ -213,9 +261,10 @@ _SAID = (
 )
 
 
-def siemens(text, programs=None):
-    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name."""
-    run, variables = _Machine(), {f"R{n}": 0.0 for n in range(100)}
+def siemens(text, programs=None, radius=None):
+    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name, ``radius`` is
+    that of every tool."""
+    run, variables = _Machine(radius), {f"R{n}": 0.0 for n in range(100)}
     _siemens_program(text, run, variables, {"g": 0, "modal": None}, programs or {}, 0)
     return run.places
 
@@ -349,13 +398,18 @@ def _siemens_block(line, run, variables, state):
         raise Unknown(line)
     gs = {float(v) for a, v in words if a == "G"}
     ms = {float(v) for a, v in words if a == "M"}
-    if gs & {41, 42, 18, 19, 110, 111, 112, 58, 59, 33, 331, 70}:
+    if gs & {18, 19, 110, 111, 112, 58, 59, 33, 331, 70}:
         raise Unknown("G-code")
     run.unit = 25.4 if 700 in gs else 1.0 if gs & {71, 710} else run.unit
     run.absolute = True if 90 in gs else False if 91 in gs else run.absolute
     moves = {int(g) for g in gs} & {0, 1, 2, 3}
     state["g"] = moves.pop() if moves else state["g"]
-    to = {}
+    if gs & {450, 451} and run.elements:
+        raise Unknown("other corners within a contour")
+    run.corners = "meeting" if 451 in gs else "arc" if 450 in gs else run.corners
+    if gs & {40, 41, 42}:
+        run.switch(1 if 41 in gs else -1 if 42 in gs else 0)
+    to, corner, words_of_arc = {}, None, {}
     for address, value in words:
         if address in ("X", "Y", "Z"):
             way = value[:2] if value[:2] in ("AC", "IC") else ""
@@ -365,7 +419,11 @@ def _siemens_block(line, run, variables, state):
             )
         elif address in variables:
             variables[address] = _value(value, variables)
-        elif address not in ("G", "M", "F", "S", "T", "D", "N", "I", "J", "K", "CR", "TURN", "P", "S1", "H"):
+        elif address in ("RND", "CHR", "CHF"):
+            corner = (address, _value(value, variables) * run.unit)
+        elif address in ("I", "J", "CR"):
+            words_of_arc[address] = value
+        elif address not in ("G", "M", "F", "S", "T", "D", "N", "K", "TURN", "P", "S1", "H"):
             raise Unknown(address)
     if frame:
         for axis in run.shift:
@@ -375,10 +433,37 @@ def _siemens_block(line, run, variables, state):
         for axis in to:
             run.at[axis] = None
     elif 4 not in gs and (to or (state["g"] > 1 and any(a in ("I", "J") for a, _ in words))):
-        run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        there = {axis: run.target(axis, *value) for axis, value in to.items()}
+        run.move(there, *_siemens_arc(run, there, words_of_arc, state["g"], variables), corner, state["g"] > 0)
         if state["modal"]:
             run.hole(*state["modal"])
     return bool(ms & {2, 17, 30})
+
+
+def _siemens_arc(run, to, words, g, variables):
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out under G41 alone."""
+    if g < 2:
+        return None, 0
+    turn = 1 if g == 3 else -1
+    if not run.side:
+        return None, turn
+    if "CR" not in words:
+        parts = []
+        for axis, letter in (("X", "I"), ("Y", "J")):
+            value = words.get(letter, "0")
+            absolute = value.startswith("AC")
+            part = _value(value[2:] if absolute else value, variables) * run.unit
+            parts.append(part + (run.shift[axis] if absolute else run.at[axis]))
+        return complex(*parts), turn
+    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    return _centre(here, there, _value(words["CR"], variables) * run.unit, turn), turn
+
+
+def _centre(here, there, radius, turn):
+    """Return the centre of the arc of a radius, below 0 the longer one."""
+    half = (there - here) / 2
+    away = math.sqrt(max(0.0, radius**2 - abs(half) ** 2)) * (1 if radius > 0 else -1)
+    return here + half + turn * 1j * half / abs(half) * away
 
 
 def _siemens_hole(cycle, variables):
@@ -390,8 +475,8 @@ def _siemens_hole(cycle, variables):
     return rfp + (sdis or 0.0), rfp - dpr if dpr else dp, rtp
 
 
-def heidenhain(text):
-    """Return the places of a conversational program."""
+def heidenhain(text, radius=None):
+    """Return the places of a conversational program; ``radius`` is that of every tool."""
     logical = []
     for line in text.splitlines():
         goes_on = line.rstrip().endswith("~")
@@ -402,10 +487,24 @@ def heidenhain(text):
             logical.append((code, goes_on))
     codes = [re.sub(r"\bCYCLE DEF\b", "CYCL DEF", code.replace(",", ".")) for code, _ in logical]
     labels = {m[1]: k for k, code in enumerate(codes) if (m := re.match(r"LBL (\S+)$", code)) and m[1] != "0"}
-    run, q = _Machine(), {}
+    codes = _with_corners(codes)
+    run, q = _Machine(radius), {}
     state = {"pole": {}, "hole": None}
     _heidenhain_lines(codes, 0, labels, run, q, state, 0)
     return run.places
+
+
+def _with_corners(codes):
+    """Return the lines, those of RND and CHF behind the line to whose end they belong."""
+    found = []
+    for code in codes:
+        if (m := re.match(r"(RND|CHF) ?R?([\d.]+)(?: F\S+)?$", code)) is not None and found:
+            at = next(k for k in reversed(range(len(found))) if found[k])
+            found[at] += f" [{'RND' if m[1] == 'RND' else 'CHR'} {m[2]}]"
+            found.append("")
+        else:
+            found.append(code)
+    return found
 
 
 def _heidenhain_lines(codes, k, labels, run, q, state, depth):
@@ -448,8 +547,12 @@ def _heidenhain_block(code, run, q, state):
             state["pole"][axis] = _value(value, q)
         return False
     if head in ("L", "C", "CR", "CT") or re.match(r"M\d", head):
-        if re.search(r"\bR[LR]\b|\b[ABC][+-]?\d|\bPLANE|\bM128", code):
-            raise Unknown("compensation or rotary axes")
+        code, _, behind = code.partition(" [")
+        corner = (behind.split(" ")[0], float(behind.split(" ")[1].rstrip("]"))) if behind else None
+        if re.search(r"\b[ABC][+-]?\d|\bPLANE|\bM128", code):
+            raise Unknown("rotary axes")
+        if (side := re.search(r"\bR([0LR])\b", code)) is not None:
+            run.switch({"0": 0, "L": 1, "R": -1}[side[1]])
         to = {}
         for incremental, axis, value in re.findall(r"(?:^| )(I?)([XYZ]) ?([+-]?[\dQ.]+)", code):
             to[axis] = (_value(value, q), bool(incremental))
@@ -457,8 +560,9 @@ def _heidenhain_block(code, run, q, state):
         if machine:
             for axis in to or {"Z": 0}:
                 run.at[axis] = None
-        elif to:
-            run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        elif to or head == "C":
+            there = {axis: run.target(axis, *value) for axis, value in to.items()}
+            run.move(there, *_heidenhain_arc(head, code, there, run, q, state), corner)
         if re.search(r"\bM99\b", code):
             run.hole(*_heidenhain_hole(run, state))
         return re.search(r"\bM(?:0?2|30)\b", code) is not None
@@ -467,6 +571,23 @@ def _heidenhain_block(code, run, q, state):
         run.go(Z=run.at["Z"] + (float(z[1]) if z else 0.0))
         return False
     raise Unknown(code)
+
+
+def _heidenhain_arc(head, code, to, run, q, state):
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out beside a contour alone."""
+    if head not in ("C", "CR", "CT"):
+        return None, 0
+    way = re.search(r"\bDR ?([+-])", code)
+    turn = 1 if way is None or way[1] == "+" else -1
+    if not run.side:
+        return None, turn
+    if head == "C":
+        return complex(state["pole"]["X"] + run.shift["X"], state["pole"]["Y"] + run.shift["Y"]), turn
+    if head == "CT":
+        raise Unknown("CT beside a contour")
+    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    radius = re.search(r"(?<!D)R ?([+-]?[\d.]+)", code)
+    return _centre(here, there, _value(radius[1], q), turn), turn
 
 
 def _heidenhain_hole(run, state):
