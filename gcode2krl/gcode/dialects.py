@@ -239,6 +239,11 @@ REASONS: Final = (
         " along the tool, an arc, or with another block before the contour is not sure",
         "write G41 and G42 in the block before the contour, and G40 right behind it",
     ),
+    (
+        "HOLES1, HOLES2 and CYCLE801 are read under MCALL with a cycle, in G17 and G90, from where X and Y are known: the"
+        " arguments that place the holes alone, at most 10000 holes, in less than a turn",
+        "write MCALL CYCLE81(…) before it, or let the post write X and Y of each hole",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -258,7 +263,7 @@ REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_LOOK_AHEAD =
 REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_KONT, REASON_TOOL_OFFSET = range(59, 64)
 REASON_FREE_CONTOUR, REASON_TNC_INCHES, REASON_TOOL_CALL, REASON_TNC_LABEL, REASON_TNC_POLE = range(64, 69)
 REASON_TNC_ARC, REASON_TNC_WORD, REASON_TNC_M, REASON_HOLE, REASON_REAM, REASON_BORE = range(69, 75)
-REASON_NO_MEETING, REASON_SHIFT_ALONE = 75, 76
+REASON_NO_MEETING, REASON_SHIFT_ALONE, REASON_PATTERN = 75, 76, 77
 REASON_ROTATED, REASON_SCALED, REASON_BORING, REASON_PROBING = _ROTATED, _SCALED, _BORING, _PROBING
 REASON_CYCLE, REASON_SMOOTH, REASON_SHIFT = _CYCLE, _SMOOTH, _SHIFT
 FIRST_VARIABLE = FIRST_REAL
@@ -337,6 +342,8 @@ class Dialect:
     """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
     variables: Mapping[str, int] = field(default_factory=dict)
     """Numbers, as parameters, of the variables that the program defines, by their names in capitals."""
+    arrays: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
+    """Of its arrays the number of the first element, and the sizes, 0 for none, by their names in capitals."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -383,6 +390,7 @@ class Dialect:
         pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
         pairs += [(f'"{name}"', _kind(d.TOOL_NAME, number)) for name, number in self.tool_names.items()]
         pairs += [(name, _kind(d.VARIABLE, number)) for name, number in self.variables.items()]
+        pairs += [(f"{name}[", _kind(d.ARRAY, number)) for number, name in enumerate(self.arrays)]
         text = "".join(f"{name}\n" for name, _ in pairs).encode()
         return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
 
@@ -491,12 +499,13 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
-        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
-        *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
+        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
         *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79"),
-        *("CYCLE87", "CYCLE88", "CYCLE801", "CYCLE802"),
+        *("CYCLE87", "CYCLE88", "CYCLE802"),
     ),
-    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800)},
+    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800, 801)},
+    _kind(d.CYCLE_CALL, v.CYCLE_ROW): ("HOLES1",),
+    _kind(d.CYCLE_CALL, v.CYCLE_CIRCLE): ("HOLES2",),
     _kind(d.MODAL_CALL): ("MCALL",),
     _kind(d.REFUSED, _THREAD): ("CYCLE840",),
     _kind(d.REFUSED, _FLOW): (

@@ -7,6 +7,7 @@ makes of places what two readings can be compared by: at each X and Y the lowest
 strokes of a hole differ by parameters. What this does not know raises `Unknown`, and the program is not compared.
 """
 
+import cmath
 import functools
 import math
 import re
@@ -246,7 +247,7 @@ def _code(text):
 def _value(text, variables):
     """Return the value of an expression of a Sinumerik or Heidenhain."""
     try:
-        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS}, variables))
+        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS, "R": _Parameters(variables)}, variables))
     except Exception as error:
         raise Unknown(text) from error
 
@@ -254,11 +255,52 @@ def _value(text, variables):
 _BRACKET = r"\([^()]*\)"
 for _ in range(3):  # brackets within brackets
     _BRACKET = rf"\((?:[^()]|{_BRACKET})*\)"
-_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();\[\]]|\[[^\]]*\]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _SAID = (
     r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|NORM|CYCLE832\s*\([^)]*\)"
     r"|G64[0-9]*|ADIS\s*=\S+)"
 )
+
+
+class _Array:
+    """An array of a Sinumerik: indices are whole numbers from 0 on, one or two."""
+
+    def __init__(self, sizes):
+        self.sizes = [int(size) for size in sizes]
+        self.values = [0.0] * math.prod(self.sizes)
+
+    def place(self, index):
+        """Return the place of an element."""
+        index = index if isinstance(index, tuple) else (index,)
+        if len(index) != len(self.sizes) or any(i != int(i) or not 0 <= i < n for i, n in zip(index, self.sizes, strict=True)):
+            raise Unknown("index")
+        return int(index[0]) if len(index) == 1 else int(index[0]) * self.sizes[1] + int(index[1])
+
+    def __getitem__(self, index):
+        return self.values[self.place(index)]
+
+    def fill(self, first, text, variables):
+        """Give elements the values of SET(…) or REP(…), or one."""
+        m = re.match(r"(SET|REP)\((.*)\)$", text)
+        values = [_value(part, variables) for part in m[2].split(",")] if m else [_value(text, variables)]
+        if m and m[1] == "REP":
+            values *= len(self.values) - first
+        self.values[first : first + len(values)] = values
+
+
+class _Parameters:
+    """R parameters by a number that is worked out: R[R1+2]."""
+
+    def __init__(self, variables):
+        self.variables = variables
+
+    def __getitem__(self, index):
+        return self.variables[f"R{int(index)}"]
+
+
+def _outside_brackets(text):
+    """Return the parts of a text between the commas that stand in no bracket."""
+    return re.findall(r"(?:[^,(\[]|\([^()]*\)|\[[^\]]*\])+", text)
 
 
 def siemens(text, programs=None, radius=None):
@@ -272,7 +314,7 @@ def siemens(text, programs=None, radius=None):
 def _siemens_call(line, run, variables, state, programs, depth):
     """Run a subprogram that a line calls; return whether it is such a line."""
     m = re.match(r"([A-Z_]{2}\w*|L\d+)\s*(?:\((.*)\))?\s*(?:P\s*=?\s*(\d+))?$", line)
-    if m is None or m[1] not in programs:
+    if m is None or m[1] not in programs or m[1] in ("HOLES1", "HOLES2", "CYCLE801"):
         return False
     if depth > 8:
         raise Unknown("calls")
@@ -374,15 +416,32 @@ def _blocks(codes):
 def _siemens_block(line, run, variables, state):
     """Carry out one block; return whether the program ends."""
     if (m := re.match(r"DEF\s+(?:REAL|INT|BOOL)\s+(.*)$", line)) is not None:
-        for part in m[1].split(","):
+        for part in _outside_brackets(m[1]):
             name, _, value = part.partition("=")
-            variables[name.strip()] = _value(value, variables) if value else 0.0
+            sizes = re.match(r"\s*(\w+)\[(.*)\]\s*$", name)
+            if sizes:
+                variables[sizes[1]] = _Array(sizes[2].split(","))
+                if value:
+                    variables[sizes[1]].fill(0, value, variables)
+            else:
+                variables[name.strip()] = _value(value, variables) if value else 0.0
         return False
+    while (m := re.match(r"(\w+)\[([^=]*)\]=(\S+)\s*", line)) is not None:
+        index = tuple(_value(part, variables) for part in _outside_brackets(m[2]))
+        if m[1] == "R":
+            variables[f"R{int(index[0])}"] = _value(m[3], variables)
+        else:
+            array = variables[m[1]]
+            array.fill(array.place(index), m[3], variables)
+        line = line[m.end() :]
     line = re.sub(_SAID, " ", line)
     if line.startswith("%") or line.startswith("WORKPIECE"):
         return False
     modal = "MCALL" in line
     cycle = re.search(r"CYCLE(8[123])\s*\((.*)\)", line)
+    if (pattern := re.match(r"(HOLES1|HOLES2|CYCLE801)\((.*)\)$", line)) is not None:
+        _siemens_pattern(pattern[1], [_value(part, variables) if part else 0.0 for part in pattern[2].split(",")], run, state)
+        return False
     if cycle or modal:
         hole = _siemens_hole(cycle, variables) if cycle else None
         if modal:
@@ -464,6 +523,34 @@ def _centre(here, there, radius, turn):
     half = (there - here) / 2
     away = math.sqrt(max(0.0, radius**2 - abs(half) ** 2)) * (1 if radius > 0 else -1)
     return here + half + turn * 1j * half / abs(half) * away
+
+
+def _siemens_pattern(name, given, run, state):
+    """Drill a row, a circle or a grid of holes from where the tool stands."""
+    here = complex(run.at["X"] - run.shift["X"], run.at["Y"] - run.shift["Y"])
+    begin = complex(given[0], given[1])
+    if name == "HOLES2":
+        radius, first, step, count = abs(given[2]), given[3], given[4], int(given[5])
+        step = step or 360 / count
+        places = [begin + radius * cmath.exp(1j * math.radians(first + k * step)) for k in range(count)]
+    else:
+        way = cmath.exp(1j * math.radians(given[2]))
+        if name == "HOLES1":
+            places = [begin + (given[3] + k * given[4]) * way for k in range(int(given[5]))]
+            if abs(here - places[-1]) < abs(here - places[0]):
+                places.reverse()
+        else:
+            d1, d2, n1, n2 = given[3], given[4], int(given[5]), int(given[6])
+            at = (here - begin) / way
+            xs, ys = [k * d1 for k in range(n1)], [k * d2 for k in range(n2)]
+            xs = xs[::-1] if at.real > xs[-1] / 2 else xs
+            ys = ys[::-1] if at.imag > ys[-1] / 2 else ys
+            outer, inner = (ys, xs) if d1 <= d2 else (xs, ys)
+            grid = [(a, c) for k, a in enumerate(outer) for c in (inner if k % 2 == 0 else inner[::-1])]
+            places = [begin + (complex(c, a) if d1 <= d2 else complex(a, c)) * way for a, c in grid]
+    for place in places:
+        run.go(X=place.real + run.shift["X"], Y=place.imag + run.shift["Y"])
+        run.hole(*state["modal"])
 
 
 def _siemens_hole(cycle, variables):
