@@ -24,24 +24,27 @@ from tests.reference import contour, controls
 
 _RADIUS_MM = 3.0
 _TOOLS = {n: {"diameter_mm": 2 * _RADIUS_MM, "teeth": 2, "length_mm": 60.0} for n in range(1, 100)}
-_CUTTER = {"program": {"cutter": {"lead_in": "a", "d": "radius"}}}
+_STATED = {
+    "fanuc": {"program": {"cutter": {"lead_in": "a", "d": "radius"}}},
+    "sinumerik": {"program": {"start": {"motion": "G1"}}},
+}
 _FIRST = over_demonstration({"tool": _TOOLS})
 _NAMED_TOOL = re.compile(r'\bT\s*=\s*"([^"]+)"|TOOL CALL "([^"]+)"')
 _OTHER_DIALECT = {"fanuc": "fanuc-calculator"}
 
 
-def remedied(path):
-    """Return a cell that states what refusals ask for: the cutter, and the names of the program's tools."""
+def remedied(path, dialect):
+    """Return a cell that states what refusals ask for: the cutter, the start, and the names of the program's tools."""
     names = dict.fromkeys(name for pair in _NAMED_TOOL.findall(text_of(path)) for name in pair if name)
     tools = {n: {**_TOOLS[n], "name": name} for n, name in zip(range(99, 0, -1), names, strict=False)}
-    return over_demonstration({"tool": {**_TOOLS, **tools}, **_CUTTER})
+    return over_demonstration({"tool": {**_TOOLS, **tools}, **_STATED.get(dialect, {})})
 
 
 def reading(path, dialect, search):
     """Return how a program was read, the reading, and why not."""
     why = ""
     for how in ("read", "one remedy"):
-        cell = _FIRST if how == "read" else remedied(path)
+        cell = _FIRST if how == "read" else remedied(path, dialect)
         spoken = dialect if how == "read" else _OTHER_DIALECT.get(dialect, dialect)
         try:
             return how, read_gcode(path, cell, dialect=spoken, search=search), ""
