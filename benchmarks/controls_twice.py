@@ -4,13 +4,14 @@
 marks of a
 Fanuc, a Sinumerik or a Heidenhain, reads it in that dialect for a cell that knows the tools T1 to T99,
 follows one
-remedy where it is refused, and compares the places with the other reading within 1e-6 mm. Subprograms of a
+remedy where it is refused (a key of the cell; a second one where a Sinumerik's program has no F), and compares the places with the other reading within 1e-6 mm. Subprograms of a
 Sinumerik are looked for beside a program and in the other folders with such files. Printed is for each
 file: read, after one remedy, or not and why; and for those that are read: same, another place, or why they
 are
 not compared. The exit code is 1 where a place differs.
 """
 
+import io
 import re
 import sys
 from collections import Counter
@@ -18,6 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.origin import control_of
 from tests.cells import over_demonstration
 from tests.reference import contour, controls
@@ -43,14 +45,20 @@ def remedied(path, dialect):
 def reading(path, dialect, search):
     """Return how a program was read, the reading, and why not."""
     why = ""
-    for how in ("read", "one remedy"):
+    for how in ("read", "one remedy", "two remedies"):
         cell = _FIRST if how == "read" else remedied(path, dialect)
         spoken = dialect if how == "read" else _OTHER_DIALECT.get(dialect, dialect)
+        feed = b"F1000\n" if how == "two remedies" else b""
         try:
-            return how, read_gcode(path, cell, dialect=spoken, search=search), ""
+            if not feed:
+                return how, read_gcode(path, cell, dialect=spoken, search=search), ""
+            stream = io.BytesIO(feed + path.read_bytes())
+            return how, read_stream(stream, str(path), cell, dialect=spoken, folders=[path.parent, *search]), ""
         except Gcode2KrlError as error:
             first = next(issue for issue in error.issues if issue.severity == "error")
             why = f"line {first.line}: {first.message} [{first.code}]"
+            if how == "one remedy" and (first.code != "no-feed" or dialect != "sinumerik"):
+                break
     return "not", None, why
 
 
@@ -103,7 +111,7 @@ def main():
             said = compared(path, dialect, toolpath, search) if toolpath is not None else why
             counts[dialect, how] += 1
             counts[dialect, said.split(" ")[0] if toolpath is not None else "refused"] += 1
-            print(f"{dialect:10} {how:10} {path.name}: {said}")
+            print(f"{dialect:10} {how:12} {path.name}: {said}")
     for key, count in sorted(counts.items()):
         print(*key, count)
     return int(any(what == "DIFFERS" for _, what in counts))

@@ -257,7 +257,7 @@ for _ in range(3):  # brackets within brackets
     _BRACKET = rf"\((?:[^()]|{_BRACKET})*\)"
 _ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();\[\]]|\[[^\]]*\]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _SAID = (
-    r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|NORM|CYCLE832\s*\([^)]*\)"
+    r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|F?NORM|CYCLE832\s*\([^)]*\)|TRAFOOF|CYCLE800\(\)|SETMS\(\d\)"
     r"|G64[0-9]*|ADIS\s*=\S+)"
 )
 
@@ -482,6 +482,8 @@ def _siemens_block(line, run, variables, state):
             corner = (address, _value(value, variables) * run.unit)
         elif address in ("I", "J", "CR"):
             words_of_arc[address] = value
+        elif machine and address in ("A", "B", "C"):
+            continue
         elif address not in ("G", "M", "F", "S", "T", "D", "N", "K", "TURN", "P", "S1", "H"):
             raise Unknown(address)
     if frame:
