@@ -65,6 +65,7 @@ RECORDS = {
     "Repeat": ("gcode2krl.gcode.program_tables", "REPEAT"),
     "Assignment": ("gcode2krl.gcode.program_tables", "ASSIGNMENT"),
     "Label": ("gcode2krl.gcode.program_tables", "LABEL"),
+    "Array": ("gcode2krl.gcode.program_tables", "ARRAY"),
     "Course": ("gcode2krl.gcode.program_tables", "COURSE"),
 }
 """Name of the struct -> module and numpy record."""

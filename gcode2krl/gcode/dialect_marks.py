@@ -43,7 +43,7 @@ PROGRAM_NUMBER = ord(":")
 """``O1234`` alone in its line, where a program of that number begins."""
 
 HARMLESS, REFUSED, RADIUS, TURNS, MESSAGE, CODE, ENDS, WHOLE_LINE, SHIFT, JUMP, TIP, FEED_AXES = range(12)
-MARKED, CYCLE_CALL, MODAL_CALL, TOOL_NAME, TURN, DEFINE, VARIABLE, NAMED_ARC, APPROACH = range(12, 21)
+MARKED, CYCLE_CALL, MODAL_CALL, TOOL_NAME, TURN, DEFINE, VARIABLE, NAMED_ARC, APPROACH, ARRAY = range(12, 22)
 """Kinds of statements; a value behind the kind is below `KIND_STEP`."""
 KIND_STEP = 32
 

@@ -66,7 +66,8 @@ REASONS: Final = (
     ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
     (
         "how this control leads in and out, and what D holds, are parameters of the control",
-        'state lead_in = "a" or "b" and d = "radius", "diameter" or "wear" in [program.cutter] of the cell,'
+        'state lead_in = "a", "b", "c-a" or "c-b" and d = "radius", "diameter" or "wear" in [program.cutter] of'
+        " the cell,"
         " or let the post write the path of the tool's centre",
     ),
     (
@@ -102,7 +103,7 @@ REASONS: Final = (
     ),
     (
         "a corner is rounded or chamfered where a G1 in the plane follows another in the very next block,"
-        " both longer than the corner and with one feed, without G41 and G42",
+        " both longer than the corner and with one feed, and under G41 and G42 neither leads in or out",
         "let the post write the corner as G1, G2 and G3",
     ),
     (
@@ -184,8 +185,8 @@ REASONS: Final = (
         "write D with the tool's number; D0 for no compensation",
     ),
     (
-        "G451 and KONT decide how a compensated contour is led to and around corners",
-        "write NORM and G450, which are the start-up settings",
+        "KONT leads to and from a compensated contour by ways of its own, and DISC around its corners",
+        "write NORM and G450 without DISC, which are the start-up settings, or G451",
     ),
     (
         "G10 L10 to L13 set what the cell states: R has to be length (L10) and size (L12) of the tool P "
@@ -229,6 +230,20 @@ REASONS: Final = (
         " which the tool could be moved aside in the hole",
         "write CYCLE86(RTP,RFP,SDIS,DP,,0,3), or mill the hole",
     ),
+    (
+        "under G451 the offset sides of an outside corner do not meet",
+        "write G450 before the contour",
+    ),
+    (
+        "G41, G42 and G40 in a block without a move shift the tool at once (type C), and what they then do beside a move"
+        " along the tool, an arc, or with another block before the contour is not sure",
+        "write G41 and G42 in the block before the contour, and G40 right behind it",
+    ),
+    (
+        "HOLES1, HOLES2 and CYCLE801 are read under MCALL with a cycle, in G17 and G90, from where X and Y are known: the"
+        " arguments that place the holes alone, at most 10000 holes, in less than a turn",
+        "write MCALL CYCLE81(…) before it, or let the post write X and Y of each hole",
+    ),
 )
 """What is refused in a dialect: reason and remedy, by their number."""
 _TILTED, _ROTATED, _SCALED, _POLAR, _BORING, _PROBING, _THREAD, _OFFSETS, _CYCLE, _FLOW = range(10)
@@ -245,9 +260,10 @@ REASON_CORNER, REASON_STORED, REASON_G10 = 43, 44, 45
 _CORNERS, REASON_CYCLE_BESIDE, REASON_HEIGHTS, REASON_NO_OFFSET, REASON_MODAL_ZERO = range(46, 51)
 REASON_TURN, REASON_TURNED, REASON_FIRST_TURNED = range(51, 54)
 REASON_PECKS, REASON_PITCH, REASON_MIRROR, REASON_NAMED_ARC, REASON_LOOK_AHEAD = range(54, 59)
-REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_CORNERS_OF_G41, REASON_TOOL_OFFSET = range(59, 64)
+REASON_ENTRY_ARC, REASON_LEAD_OUT, REASON_D, REASON_KONT, REASON_TOOL_OFFSET = range(59, 64)
 REASON_FREE_CONTOUR, REASON_TNC_INCHES, REASON_TOOL_CALL, REASON_TNC_LABEL, REASON_TNC_POLE = range(64, 69)
 REASON_TNC_ARC, REASON_TNC_WORD, REASON_TNC_M, REASON_HOLE, REASON_REAM, REASON_BORE = range(69, 75)
+REASON_NO_MEETING, REASON_SHIFT_ALONE, REASON_PATTERN = 75, 76, 77
 REASON_ROTATED, REASON_SCALED, REASON_BORING, REASON_PROBING = _ROTATED, _SCALED, _BORING, _PROBING
 REASON_CYCLE, REASON_SMOOTH, REASON_SHIFT = _CYCLE, _SMOOTH, _SHIFT
 FIRST_VARIABLE = FIRST_REAL
@@ -312,6 +328,8 @@ class Dialect:
     """The tool's length applies with the tool, D0 ends it and D1 begins it; there is no G43."""
     lead: int = d.LEAD_AT_ENTRY
     """How G41 and G42 lead in, of `dialect_marks`."""
+    shifts_alone: bool = False
+    """G41, G42 and G40 in a block without a move shift the tool by themselves."""
     square_corners: bool = False
     """Outside corners of a compensated contour are straight moves."""
     d_holds: int = d.D_IS_TOOL
@@ -324,6 +342,8 @@ class Dialect:
     """Numbers of the cell's tools by their names in capitals, where no other tool has the same."""
     variables: Mapping[str, int] = field(default_factory=dict)
     """Numbers, as parameters, of the variables that the program defines, by their names in capitals."""
+    arrays: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
+    """Of its arrays the number of the first element, and the sizes, 0 for none, by their names in capitals."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -370,6 +390,7 @@ class Dialect:
         pairs = [(name, kind) for kind, names in self.statements.items() for name in names]
         pairs += [(f'"{name}"', _kind(d.TOOL_NAME, number)) for name, number in self.tool_names.items()]
         pairs += [(name, _kind(d.VARIABLE, number)) for name, number in self.variables.items()]
+        pairs += [(f"{name}[", _kind(d.ARRAY, number)) for number, name in enumerate(self.arrays)]
         text = "".join(f"{name}\n" for name, _ in pairs).encode()
         return np.frombuffer(text, np.uint8).copy(), np.array([kind for _, kind in pairs], np.int32)
 
@@ -388,6 +409,7 @@ class Dialect:
             "idle_letters": sum(1 << v.index_of(letter) for letter in self.idle_letters),
             "end_m": self.end_m,
             "lead": self.lead,
+            "shifts_alone": int(self.shifts_alone),
             "square_corners": int(self.square_corners),
             "d_holds": self.d_holds,
             "whole_dwell_letter": v.index_of("P") if self.dwell_s.get("P", 1.0) < 1.0 else -1,
@@ -477,12 +499,13 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
-        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "HOLES1"),
-        *("HOLES2", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
+        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
         *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79"),
-        *("CYCLE87", "CYCLE88", "CYCLE801", "CYCLE802"),
+        *("CYCLE87", "CYCLE88", "CYCLE802"),
     ),
-    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800)},
+    **{_kind(d.CYCLE_CALL, number): (f"CYCLE{number}",) for number in (81, 82, 83, 84, 85, 86, 89, 800, 801)},
+    _kind(d.CYCLE_CALL, v.CYCLE_ROW): ("HOLES1",),
+    _kind(d.CYCLE_CALL, v.CYCLE_CIRCLE): ("HOLES2",),
     _kind(d.MODAL_CALL): ("MCALL",),
     _kind(d.REFUSED, _THREAD): ("CYCLE840",),
     _kind(d.REFUSED, _FLOW): (
@@ -496,6 +519,7 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.MARKED, d.CORNER_LENGTH - d.CORNER_ROUND): ("CHF",),
     _kind(d.MARKED, d.TURN_DEG - d.CORNER_ROUND): ("RPL",),
     _kind(d.REFUSED, _CORNERS): ("RNDM", "FRC", "FRCM"),
+    _kind(d.REFUSED, REASON_KONT): ("DISC",),
     _kind(d.REFUSED, _ANGLE): ("AR", "INVCW", "INVCCW"),
     _kind(d.REFUSED, _SPLINE): ("ASPLINE", "BSPLINE", "CSPLINE", "POLY"),
     _kind(d.REFUSED, _PROBING): ("MEAS", "MEAW", "CYCLE977", "CYCLE978", "CYCLE971"),
@@ -567,6 +591,7 @@ OTHER_POST: Final = "export the part again with a post for LinuxCNC, Fanuc or Si
 
 
 _LEADS: Final = {"a": d.LEAD_TO_CONTOUR, "b": d.LEAD_BY_CORNER}
+"""By the last letter of ``lead_in``: type C, ``c-a`` and ``c-b``, leads so where its block moves."""
 _D_HOLDS: Final = {"radius": d.D_IS_RADIUS, "diameter": d.D_IS_DIAMETER, "wear": d.D_IS_WEAR}
 
 
@@ -574,9 +599,13 @@ def with_cutter(dialect: Dialect, lead_in: str | None, holds: str | None) -> Dia
     """Return a Fanuc's dialect with G41 and G42, where the cell states how they lead in and what D holds."""
     if dialect.programs != d.PROGRAMS_FANUC or lead_in is None or holds is None:
         return dialect
-    refused = {**dialect.refused, _LEAD: (41.1, 42.1)}
     return replace(
-        dialect, refused=refused, lead=_LEADS[lead_in], square_corners=True, d_holds=_D_HOLDS[holds]
+        dialect,
+        refused={**dialect.refused, _LEAD: (41.1, 42.1)},
+        lead=_LEADS[lead_in[-1]],
+        shifts_alone=lead_in.startswith("c"),
+        square_corners=True,
+        d_holds=_D_HOLDS[holds],
     )
 
 

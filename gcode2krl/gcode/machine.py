@@ -33,6 +33,7 @@ MACHINE = StructOf(
     cutter_diameter_mm=FLOATS,
     lead=INT,
     square_corners=INT,
+    shifts_alone=INT,
     d_holds=INT,
     programs=INT,
     has_m61_to_m73=INT,

@@ -186,11 +186,13 @@ class Program:
         text = text if text.endswith(b"\n") else text + b"\n"
         self.files.append(File(name, first_line, text, start_line))
         if self._spoken.programs == d.PROGRAMS_SINUMERIK:
-            taken = self._spoken.variables
+            taken, arrays = self._spoken.variables, self._spoken.arrays
             if len(self.files) > 1:
-                text = with_own_names(text, taken)
-            self._spoken = replace(self._spoken, variables={**taken, **variables_of(text, taken)})
+                text = with_own_names(text, taken.keys() | arrays.keys())
+            variables, more = variables_of(text, taken, arrays)
+            self._spoken = replace(self._spoken, variables={**taken, **variables}, arrays={**arrays, **more})
             self._program.statement_names, self._program.statement_kinds = self._spoken.names()
+            self._program.arrays = np.array(list(self._spoken.arrays.values()), tables.ARRAY)
         scanned, lines = Scanner(self._spoken).scan_whole(text, first_line)
         self.most_decimals = max(self.most_decimals, scanned.most_decimals)
         messages += len(self.messages)
@@ -517,6 +519,7 @@ def _empty_program(course: NDArray[Any], spoken: Dialect) -> Any:
         labels=np.zeros(0, tables.LABEL),
         statement_names=statement_names,
         statement_kinds=statement_kinds,
+        arrays=np.zeros(0, tables.ARRAY),
         syntax=spoken.syntax_bits(),
         language=spoken.programs,
     )

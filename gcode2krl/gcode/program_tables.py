@@ -140,6 +140,8 @@ LABEL = np.dtype(
     ]
 )
 """N and its number, for GOTO, sorted by segment, number, word; or a number of CASE in its line's segment."""
+ARRAY = np.dtype([("first", "i8"), ("rows", "i8"), ("columns", "i8")])
+"""An array of a Sinumerik: the parameter of its first element, and its sizes; columns 0 = it has one alone."""
 COURSE = np.dtype(
     [
         ("steps", "i8"),  # lines executed
@@ -192,6 +194,7 @@ PROGRAM = StructOf(
     labels=ArrayOf(LABEL),
     statement_names=BYTES,
     statement_kinds=INTS32,
+    arrays=ArrayOf(ARRAY),
     syntax=INT,
     language=INT,
 )

@@ -19,6 +19,8 @@ from gcode2krl.gcode import findings
 from gcode2krl.gcode import program_tables as tables
 from gcode2krl.gcode.o_words import Flow, Label, OLine
 
+Array = tuple[int, int, int]
+"""Number of the first element of an array, as a parameter, and its sizes, 0 for none."""
 _FLAGS = re.IGNORECASE | re.DOTALL
 _NAME = rb"[A-Z_][A-Z0-9_]+"
 _HEAD = rb"[ \t\r]*(?:/\d?)?[ \t\r]*(?:N[ \t]*(?P<block>\d+)[ \t]*)?"
@@ -76,14 +78,20 @@ _DEFINED = re.compile(
     rb"^[ \t\r]*(?:/\d?)?[ \t]*(?:N\d+[ \t]*)?DEF[ \t]+(?P<type>REAL|INT|BOOL)\b(?P<names>[^;\n]*)",
     _FLAGS & ~re.DOTALL | re.MULTILINE,
 )
-_VARIABLE = re.compile(rb"[ \t]*([A-Z_]{2}[A-Z0-9_]*)[ \t]*(?:=|,|\Z)", re.IGNORECASE)
+_VARIABLE = re.compile(
+    rb"[ \t]*(?P<name>[A-Z_]{2}[A-Z0-9_]*)(?:\[[ \t]*(?P<rows>\d{1,4})[ \t]*(?:,[ \t]*(?P<columns>\d{1,4})[ \t]*)?\])?"
+    rb"[ \t]*(?:=|\Z)",
+    re.IGNORECASE,
+)
+_BETWEEN_COMMAS = re.compile(rb"(?:[^,(\[]|\((?:[^()]|\([^()]*\))*\)|\[[^\]]*\])+")
+_MOST_ELEMENTS = 1000
 _ROOM = {
     b"REAL": (tables.FIRST_REAL, tables.FIRST_INT),
     b"INT": (tables.FIRST_INT, tables.FIRST_BOOL),
     b"BOOL": (tables.FIRST_BOOL, tables.MOST_PARAMETERS),
 }
 _LOOP_END = re.compile(rb"\bTO\b(?P<end>[^;]*)", _FLAGS)
-_NAMED = re.compile(rb"\b(?:R\d+|[A-Z_]{2}\w*)\b(?![ \t]*\()", re.IGNORECASE)
+_NAMED = re.compile(rb"\b(?:R(?=\[)|(?:R\d+|[A-Z_]{2}\w*)\b(?![ \t]*\())", re.IGNORECASE)
 _OPENS = {"if": "if", "while": "while", "for": "while", "loop": "while", "repeat": "do"}
 _ENDS = {
     "else": "else",
@@ -103,40 +111,55 @@ _OPENED_BY = {
 _WITH_EXPRESSION = ("if", "while", "for", "until")
 
 
-def variables_of(text: bytes, taken: Mapping[str, int]) -> dict[str, int]:
-    """Return the numbers, as parameters, of the variables that a file defines, by names in capitals.
+def variables_of(
+    text: bytes, taken: Mapping[str, int], taken_arrays: Mapping[str, Array]
+) -> tuple[dict[str, int], dict[str, Array]]:
+    """Return the numbers, as parameters, of the variables that a file defines, and its arrays, by names in capitals.
 
-    ``taken`` are those of the files before.
+    ``taken`` and ``taken_arrays`` are those of the files before.
     """
     numbers: dict[str, int] = {}
+    arrays: dict[str, Array] = {}
+    ends = [n + 1 for n in taken.values()] + [first + _size(*sizes) for first, *sizes in taken_arrays.values()]
     free = {
-        of_type: max((n + 1 for n in taken.values() if first <= n < end), default=first)
-        for of_type, (first, end) in _ROOM.items()
+        of_type: max((n for n in ends if first < n <= end), default=first) for of_type, (first, end) in _ROOM.items()
     }
-    for of_type, name in _names_defined(text):
-        if name not in numbers and free[of_type] < _ROOM[of_type][1]:
+    for of_type, name, rows, columns in _names_defined(text):
+        size = _size(rows, columns)
+        if name in numbers or name in arrays or free[of_type] + size > _ROOM[of_type][1]:
+            continue
+        if rows:
+            arrays[name] = (free[of_type], rows, columns)
+        else:
             numbers[name] = free[of_type]
-            free[of_type] += 1
-    return numbers
+        free[of_type] += size
+    return numbers, arrays
 
 
-def _names_defined(text: bytes) -> Iterator[tuple[bytes, str]]:
-    """Yield type and name of each variable that PROC and DEF define."""
+def _size(rows: int, columns: int) -> int:
+    return max(1, rows) * max(1, columns)
+
+
+def _names_defined(text: bytes) -> Iterator[tuple[bytes, str, int, int]]:
+    """Yield type and name of each variable that PROC and DEF define, and its sizes as an array, 0 for none."""
     heading = _HEADING.match(text)
     for part in (heading["formals"] or b"").split(b",") if heading is not None else ():
         formal = _FORMAL.match(part)
         if formal is not None:
-            yield formal["type"].upper(), formal["name"].upper().decode()
+            yield formal["type"].upper(), formal["name"].upper().decode(), 0, 0
     for found in _DEFINED.finditer(text):
-        for part in found["names"].rstrip(b" \t\r").split(b","):
+        for part in _BETWEEN_COMMAS.findall(found["names"].rstrip(b" \t\r")):
             name = _VARIABLE.match(part)
-            if name is not None:
-                yield found["type"].upper(), name[1].upper().decode()
+            if name is None:
+                continue
+            rows, columns = (int(name[size] or 0) for size in ("rows", "columns"))
+            if _size(rows, columns) <= _MOST_ELEMENTS and (rows > 0 or not name["rows"]):
+                yield found["type"].upper(), name["name"].upper().decode(), rows, columns
 
 
 def with_own_names(text: bytes, taken: Container[str]) -> bytes:
     """Return a subprogram whose variables have names that no file before has, each as long as it was."""
-    for name in dict.fromkeys(name for _, name in _names_defined(text) if name in taken):
+    for name in dict.fromkeys(name for _, name, *_ in _names_defined(text) if name in taken):
         free = next(
             other
             for letters in product(ascii_uppercase, repeat=2)
@@ -319,7 +342,11 @@ class SiemensFlow:
         names = _NAMED.findall(end["end"]) if end is not None else []
         if not names:
             return False
-        sets = re.compile(rb"\b(?:" + b"|".join(names) + rb")[ \t]*=(?!=)", re.IGNORECASE)
+        whole = [rb"R\d+" if name.upper() == b"R" else name for name in names]
+        places = b"|".join(name + rb"(?:\[[^\]=]*\])?" for name in whole)
+        if any(re.match(rb"R(?:\d|\Z)", name, re.IGNORECASE) for name in names):
+            places += rb"|R\[[^\]=]*\]"
+        sets = re.compile(rb"\b(?:" + places + rb")[ \t]*=(?!=)", re.IGNORECASE)
         return any(sets.search(content.split(b";")[0]) for content in self._contents[first + 1 : last])
 
     # --- repeated sections ------------------------------------------------------------------------------

@@ -115,7 +115,8 @@ STATE = np.dtype(
         ("cutter_led", "i1"),  # the move behind it too, to which a control other than LinuxCNC leads
         ("cutter_idle", "i4"),  # blocks without a move in the plane since the last one
         ("cutter_d", "i4"),  # D that a Fanuc's G41 takes, -1 = none yet
-        ("cutter_unread", "i4"),  # bits of what a Sinumerik's G41 is not read under: G451, KONT
+        ("cutter_ways", "i4"),  # bits, WAY_…: how a Sinumerik leads in and around corners
+        ("cutter_shift_mm_s", "f8"),  # speed of the shift that G41 alone owes, 0 = none
         ("cutter_failed", "i1"),  # a corner has been reported: further ones are consequences
         ("cutter_normal", "f8", 2),  # in the plane, from the programmed point (x, y, z) to the tool
         ("held_turn", "i4"),  # the element before this one: 1 = arc ccw, -1 = arc cw, 0 = line
@@ -190,7 +191,7 @@ MODES = np.dtype(
 
 ZERO_DROPPED, ZERO_OFF = 1, 2
 """The tip's transformation was switched under a work offset, which the control may have dropped; G500."""
-UNREAD_CORNERS, UNREAD_APPROACH = 1, 2
+WAY_MEETING, WAY_KONT = 1, 2
 """G451 and KONT of a Sinumerik."""
 CUTTER_ON, CUTTER_BESIDE = 1, 2
 """Cutter compensation is on; G40 has left the tool beside the programmed point, until a straight move."""

@@ -83,6 +83,8 @@ CYCLE_TAP, CYCLE_REAM, CYCLE_BORE_STOP, CYCLE_BORE = 84, 85, 86, 89
 """Canned cycles among the motion modes; no other mode has a number as large as the first."""
 CYCLE_SWIVEL = 800
 """Of a Sinumerik, CYCLE800."""
+CYCLE_ROW, CYCLE_CIRCLE, CYCLE_GRID = 1001, 1002, 801
+"""HOLES1, HOLES2 and CYCLE801 of a Sinumerik."""
 CYCLE_BEHIND = 1000
 """A hole behind the move of its block: the arguments are kind and feed, and then those of the cycle of
 that kind."""

@@ -232,7 +232,7 @@ static bool chords(Block *b, const Arc *arc, int64_t turns, Fit fit) {
         note_spiral(b, arc);
     learn(b);
     if (compensates(b->state))
-        return compensated_arc(b, arc, turns, mm_s);
+        return compensated_arc(b, arc, ccw, turns, mm_s);
     emit_chords(b, arc, angle, sweep, count, mm_s);
     return true;
 }

@@ -1,8 +1,8 @@
 /* Cutter radius compensation: a filter between the motion of a block and its rows.
 
    Controls other than LinuxCNC lead in otherwise, and a Fanuc goes around an outside corner in straight moves
-   (D_LEAD_…; Fanuc, Operator's Manual, cutter compensation: types A and B by parameter 5003; Siemens, Programming
-   Manual, Fundamentals: NORM and G450).
+   (D_LEAD_…; Fanuc, Operator's Manual, cutter compensation: types A, B and C by parameter 5003; Siemens, Programming
+   Manual, Fundamentals: NORM, G450 and G451; Function Manual, Basic Functions, W1: very pointed outside corners).
 
    The state's x, y, z stay the programmed point; the rows get the centre of the tool, a radius to the side.
    At an outside corner an arc is put in. At an inside corner the element before ends early, where the tool
@@ -23,8 +23,10 @@ static const double SLACK_MM = 1e-7;
 static const double SMALLEST_COSINE = 1e-4;
 /* The same for controls whose corners are exact; what rounding makes of a smooth one. */
 static const double EXACT_CORNER_RAD = 1e-6;
+/* Beyond this bend G451 goes around by an arc: MD20210 as delivered. */
+static const double MOST_MEETING_RAD = 100.0 * (PI / 180.0);
 /* Blocks without a move in the plane between two moves: behind more a control may not see the corner. */
-enum { MOST_IDLE = 1, ROWS_OF_CORNER = 4 };
+enum { MOST_IDLE = 1, ROWS_OF_CORNER = 4, NO_ROWS = -1 };
 
 /* What a block adds to the path of the tool. */
 typedef struct {
@@ -218,8 +220,17 @@ void end_compensation(Block *b) {
     if (compensates(s) && s->cutter_entered) {
         end_held(b, tool_at(s));
         s->cutter_mode |= S_CUTTER_BESIDE;
+        s->corner_rows = NO_ROWS; /* the move that leads out makes no corner */
     }
     s->cutter_mode &= ~S_CUTTER_ON;
+}
+
+/* G40 alone on a control that takes the offset off at once. */
+void shift_back(Block *b, double mm_s) {
+    State *s = b->state;
+    const double programmed_mm[3] = {s->x, s->y, s->z};
+    emit_at(b, in_plane(s, programmed_mm), along_tool(s, programmed_mm), mm_s);
+    s->cutter_mode &= ~S_CUTTER_BESIDE;
 }
 
 /* A tool change between G40 and the move that leads back: the program goes on from where the tool stands. */
@@ -247,6 +258,27 @@ static void square_corner(Block *b, Point from, Point before, Point to, Point af
     emit_at(b, plus(to, -radius_mm, after), w, mm_s);
 }
 
+/* Go along a piece from one of its points to another, forwards or back. */
+static void go_on(Block *b, const Piece *piece, Point from, Point to, double w, double mm_s) {
+    const Point a = minus(from, piece->centre), c = minus(to, piece->centre);
+    if (piece->turn == 0)
+        emit_at(b, to, w, mm_s);
+    else
+        emit_arc(b, piece->centre, from, to, w, w, atan2(cross(a, c), dot(a, c)), mm_s);
+}
+
+/* G451: along the element before to where its path meets that of the next one, and along that to its start. */
+static void go_to_meeting(Block *b, const Element *next, double w) {
+    const Piece before = held_piece(b->state);
+    Point meeting;
+    if (!meeting_point(&before, &next->piece, -b->state->cutter_side, &meeting)) {
+        fault(b, F_DIALECT_STATEMENT, DR_REASON_NO_MEETING);
+        return;
+    }
+    go_on(b, &before, before.at, meeting, w, next->mm_s);
+    go_on(b, &next->piece, meeting, next->piece.at, w, next->mm_s);
+}
+
 /* Go around an outside corner: an arc about the programmed point, or a rapid move. */
 static void go_around(Block *b, const Element *next) {
     State *s = b->state;
@@ -257,6 +289,11 @@ static void go_around(Block *b, const Element *next) {
         square_corner(b, from, held_direction(s), next->piece.at, next->along, w, next->mm_s);
         if (next->piece.turn != 0)
             emit_at(b, next->piece.at, w, next->mm_s);
+        return;
+    }
+    const double bend_rad = fabs(atan2(cross(held_direction(s), next->along), dot(held_direction(s), next->along)));
+    if (s->cutter_ways & S_WAY_MEETING && bend_rad <= MOST_MEETING_RAD) {
+        go_to_meeting(b, next, w);
         return;
     }
     if (isinf(next->mm_s)) {
@@ -334,6 +371,22 @@ bool lead_out(Block *b, const double to_mm[3], double mm_s) {
 
 /* --- lines and arcs ------------------------------------------------------------------------------------- */
 
+/* Shift the tool beside the first element behind G41 alone, where the control does so at once; tell whether it does. */
+static bool shift_beside(Block *b, Point at, double w) {
+    State *s = b->state;
+    const int32_t line = b->line;
+    if (s->cutter_entered || s->cutter_shift_mm_s == 0.0)
+        return false;
+    if (s->cutter_idle > MOST_IDLE)
+        fault(b, F_DIALECT_STATEMENT, DR_REASON_SHIFT_ALONE);
+    b->line = s->cutter_line;
+    emit_at(b, at, w, s->cutter_shift_mm_s);
+    b->line = line;
+    s->cutter_shift_mm_s = 0.0;
+    s->cutter_led = 1;
+    return true;
+}
+
 static bool is_too_short(Block *b, double left) {
     if (left >= -SLACK_MM)
         return false;
@@ -365,7 +418,9 @@ bool compensated_line(Block *b, const double to_mm[3], double mm_s) {
     line.piece.at = plus(here, radius_mm, line.normal);
     line.to = plus(to, radius_mm, line.normal);
     Point from = here;
-    if (s->cutter_entered) {
+    if (shift_beside(b, line.piece.at, from_w)) {
+        from = line.piece.at;
+    } else if (s->cutter_entered) {
         if (!join(b, &line, &from) || is_too_short(b, dot(line.along, minus(line.to, from)))) {
             emit_at(b, to, to_w, mm_s);
             return true;
@@ -373,7 +428,7 @@ bool compensated_line(Block *b, const double to_mm[3], double mm_s) {
     }
     const int64_t first_row = b->counts->rows;
     emit_at(b, line.to, to_w, mm_s);
-    if (!s->cutter_entered)
+    if (!s->cutter_entered && !s->cutter_led)
         line.piece.along = (Point){0.0, 0.0}; /* an entry is longer than the radius: it cannot be turned around */
     hold(b, &line, from, from_w, 0.0, first_row);
     s->cutter_entered = 1;
@@ -417,21 +472,21 @@ static bool entry_arc(Block *b, const Arc *arc, Element *element) {
 }
 
 /* Write an arc of the tool along a programmed one; return false where there is no room for its rows. */
-bool compensated_arc(Block *b, const Arc *arc, int64_t turns, double mm_s) {
+bool compensated_arc(Block *b, const Arc *arc, bool ccw, int64_t turns, double mm_s) {
     State *s = b->state;
-    const bool ccw = s->motion == V_MOTION_ARC_CCW, entered = s->cutter_entered;
+    const bool entered = s->cutter_entered, shifted = !entered && s->cutter_shift_mm_s != 0.0;
     const double larger_mm = greater(arc->from_radius_mm, arc->to_radius_mm) + s->cutter_radius_mm;
     double angle;
-    if (!entered && b->machine->lead) {
+    if (!entered && b->machine->lead && !shifted) {
         fault(b, F_DIALECT_STATEMENT, DR_REASON_ENTRY_ARC);
         return true;
     }
     double sweep_rad = fabs(sweep_angle(arc->from, arc->to, arc->centre, ccw, turns, &angle));
     Element element = {.mm_s = mm_s};
     Point from = arc->from;
-    if (!arc_element(b, arc, ccw ? 1 : -1, &element) || (!entered && !entry_arc(b, arc, &element)))
+    if (!arc_element(b, arc, ccw ? 1 : -1, &element) || (!entered && !shifted && !entry_arc(b, arc, &element)))
         return true;
-    if (!entered)
+    if (!entered && !shifted)
         sweep_rad = fabs(sweep_angle(from, element.to, element.piece.centre, ccw, turns, &angle));
     const double most_mm = greater(larger_mm, element.piece.radius_mm);
     const int64_t chords = chords_of(b, most_mm, sweep_rad + 1.0) + chords_of(b, s->cutter_radius_mm, 2.0 * PI) + ROWS_OF_CORNER;
@@ -443,6 +498,8 @@ bool compensated_arc(Block *b, const Arc *arc, int64_t turns, double mm_s) {
         return false;
     if (entered && !join(b, &element, &from))
         return true;
+    if (shift_beside(b, element.piece.at, arc->from_w))
+        from = element.piece.at;
     if (entered)
         sweep_rad -= angle_past(arc->centre, element.piece.turn, element.piece.at, from);
     if (is_too_short(b, sweep_rad))
@@ -451,5 +508,26 @@ bool compensated_arc(Block *b, const Arc *arc, int64_t turns, double mm_s) {
     emit_arc(b, element.piece.centre, from, element.to, arc->from_w, arc->to_w, element.piece.turn * sweep_rad, mm_s);
     hold(b, &element, from, arc->from_w, sweep_rad, first_row);
     s->cutter_entered = 1;
+    return true;
+}
+
+/* Make the corner between two straight moves of the contour: the one before ends where it begins, and an arc (bend 0: a
+   chamfer) leads to where the next begins. Return false, with nothing done, where there is no room for the rows of both. */
+bool compensated_corner(Block *b, const Arc *arc, double bend_rad, double mm_s) {
+    State *s = b->state;
+    const int64_t around = chords_of(b, s->cutter_radius_mm, 2.0 * PI) + ROWS_OF_CORNER;
+    const int64_t along = bend_rad == 0.0 ? 1 : chords_of(b, arc->from_radius_mm + s->cutter_radius_mm, 2.0 * PI);
+    double from_mm[3];
+    if (!has_room_for(b, along + 2 * around))
+        return false;
+    if (!end_held(b, plus(arc->from, s->cutter_radius_mm, point_of(s->cutter_normal))))
+        return true;
+    in_space(s, arc->from, arc->from_w, from_mm);
+    stand_at(s, from_mm);
+    if (bend_rad == 0.0)
+        compensated_line(b, arc->to_mm, mm_s);
+    else
+        compensated_arc(b, arc, bend_rad > 0.0, 1, mm_s);
+    stand_at(s, arc->to_mm);
     return true;
 }

@@ -1,7 +1,7 @@
 /* Corners that a dialect has rounded or chamfered between two straight moves: RND=, CHF=, CHR=, ,R and ,C.
 
    The block that names the corner has led to its point; its row ends earlier once the next block is known, and the
-   arc or the chamfer is put between. Which of the two blocks gives the corner its feed is a setting of the control
+   arc or the chamfer is put between; beside a compensated contour as an element of that. Which of the two blocks gives the corner its feed is a setting of the control
    (Sinumerik: MD20201, bit 0), so both have the same, and nothing stands between them. A corner longer than a
    move is an alarm on a Fanuc, and made smaller by a Sinumerik: it is refused. */
 
@@ -65,6 +65,8 @@ bool may_round(const Block *b, const double to_mm[3], bool by_machine, double mm
     const double at_mm[3] = {s->x, s->y, s->z};
     const bool next = counts->rows == s->corner_rows && counts->events == s->corner_events &&
                       AT(b->machine->rows.dwell_s, counts->rows - 1) == 0.0;
+    if (compensates(s) && !s->cutter_led)
+        return false;
     if (!next || s->motion != V_MOTION_LINE || by_machine || mm_s != s->corner_mm_s || b->g[V_PLANE] >= 0)
         return false;
     const Corner c = corner_of(s, to_mm);
@@ -84,9 +86,6 @@ bool round_corner(Block *b, const double to_mm[3]) {
     const Point from = {c.at.u - c.taken_mm * c.along_before.u, c.at.v - c.taken_mm * c.along_before.v};
     const Point to = {c.at.u + c.taken_mm * c.along_after.u, c.at.v + c.taken_mm * c.along_after.v};
     const int64_t chords = round ? chord_count(radius_mm, c.bend_rad, b->machine->chord_tolerance_mm) : 1;
-    b->counts->rows_wanted = b->counts->rows + chords + 1;
-    if (b->counts->rows_wanted > b->machine->rows.feed_mm_s.rows)
-        return false;
     Arc arc = {.first = c.first, .second = c.second, .third = c.third, .from = from, .to = to};
     double at_mm[3] = {s->x, s->y, s->z}, tip_mm[3];
     arc.from_w = arc.to_w = at_mm[c.third];
@@ -94,16 +93,27 @@ bool round_corner(Block *b, const double to_mm[3]) {
         arc.to_mm[axis] = at_mm[axis];
     arc.to_mm[c.first] = to.u;
     arc.to_mm[c.second] = to.v;
+    arc.centre = (Point){from.u - side * radius_mm * c.along_before.v, from.v + side * radius_mm * c.along_before.u};
+    arc.from_radius_mm = arc.to_radius_mm = radius_mm;
+    b->line = s->corner_line;
+    if (compensates(s)) {
+        const bool done = compensated_corner(b, &arc, round ? c.bend_rad : 0.0, s->corner_mm_s);
+        b->line = line;
+        s->corner *= !done;
+        return done;
+    }
+    b->counts->rows_wanted = b->counts->rows + chords + 1;
+    if (b->counts->rows_wanted > b->machine->rows.feed_mm_s.rows) {
+        b->line = line;
+        return false;
+    }
     at_mm[c.first] = from.u;
     at_mm[c.second] = from.v;
     stand_at(s, at_mm);
     tip_position(s, tip_mm);
     for (int axis = 0; axis < 3; axis++)
         CELL(b->machine->rows.position_mm, b->counts->rows - 1, axis) = tip_mm[axis];
-    b->line = s->corner_line;
     if (round) {
-        arc.centre = (Point){from.u - side * radius_mm * c.along_before.v, from.v + side * radius_mm * c.along_before.u};
-        arc.from_radius_mm = arc.to_radius_mm = radius_mm;
         emit_chords(b, &arc, atan2(from.v - arc.centre.v, from.u - arc.centre.u), c.bend_rad, chords, s->corner_mm_s);
     } else {
         stand_at(s, arc.to_mm);

@@ -3,6 +3,7 @@
 #include "gcode/cutter_settings.h"
 
 #include "gcode/compensate.h"
+#include "gcode/feed.h"
 #include "gcode/reporting.h"
 #include "gcode/rotary.h"
 #include "gcode/tool_lengths.h"
@@ -99,14 +100,17 @@ static void compare_with_tool(Block *b, double diameter_mm) {
         b->state->cutter_other_mm[0] = diameter_mm, b->state->cutter_other_mm[1] = in_cell_mm;
 }
 
+/* Tell whether a block names an axis of the plane of compensation. */
+static bool names_plane(const Block *b) {
+    return b->has[V_WORD_X] || b->has[b->state->plane == V_PLANE_XY ? V_WORD_Y : V_WORD_Z];
+}
+
 /* Warn of the other diameter where a block cuts in the plane of compensation. */
 void tell_other_diameter(Block *b) {
     State *s = b->state;
     const double *other_mm = s->cutter_other_mm;
-    const bool across = s->plane == V_PLANE_XY ? b->has[V_WORD_X] || b->has[V_WORD_Y]
-                                               : b->has[V_WORD_X] || b->has[V_WORD_Z];
     const bool centre = b->has[V_WORD_I] || b->has[V_WORD_J] || b->has[V_WORD_K];
-    if (other_mm[0] == other_mm[1] || !(across || centre) || s->motion == V_MOTION_RAPID)
+    if (other_mm[0] == other_mm[1] || !(names_plane(b) || centre) || s->motion == V_MOTION_RAPID)
         return;
     report_at(b, s->cutter_line, F_CUTTER_DIFFERS,
               (Says){.a = s->cutter_code, .b = other_mm[0], .c = other_mm[1]});
@@ -114,6 +118,36 @@ void tell_other_diameter(Block *b) {
 }
 
 /* --- on and off ----------------------------------------------------------------------------------------- */
+
+/* Return the speed of the shift that a block with G40, G41 or G42 alone makes by itself, 0 where it leads across the tool. */
+static double speed_of_shift(Block *b) {
+    const State *s = b->state;
+    const int32_t motion = b->g[V_MOTION] >= 0 ? b->g[V_MOTION] / V_TENFOLD : s->motion;
+    const bool along = b->has[V_WORD_Z] || b->has[V_WORD_Y] || b->g[V_NON_MODAL] >= 0;
+    double mm_s = INFINITY;
+    if (names_plane(b))
+        return 0.0;
+    if (along || motion > V_MOTION_LINE || s->feed_mode == V_INVERSE_TIME)
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_SHIFT_ALONE});
+    else if (motion == V_MOTION_LINE && feed_speed(b, s->cutter_radius_mm, &mm_s) != F_OK)
+        report_speed(b, feed_speed(b, s->cutter_radius_mm, &mm_s));
+    return mm_s;
+}
+
+/* G40: the offset goes with the next move, or at once. */
+static void turn_off(Block *b) {
+    State *s = b->state;
+    const bool on = s->cutter_mode & S_CUTTER_ON;
+    s->cutter_other_mm[0] = s->cutter_other_mm[1] = 0.0;
+    if (on && s->cutter_ways & S_WAY_KONT)
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_KONT});
+    if (on && compensates(s) && b->machine->shifts_alone && !s->cutter_entered && s->cutter_shift_mm_s != 0.0)
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_SHIFT_ALONE});
+    end_compensation(b);
+    const double mm_s = s->cutter_mode & S_CUTTER_BESIDE && on && b->machine->shifts_alone ? speed_of_shift(b) : 0.0;
+    if (mm_s != 0.0)
+        shift_back(b, mm_s);
+}
 
 /* Turn compensation on; after a fault by a radius of 0, so that what follows is judged by its own faults. */
 static void turn_on(Block *b, int32_t code) {
@@ -126,8 +160,8 @@ static void turn_on(Block *b, int32_t code) {
         report(b, F_CUTTER_TURNED, (Says){.a = code});
     if (b->has[V_WORD_L])
         report(b, F_CUTTER_LATHE, (Says){0});
-    if (b->machine->programs == D_PROGRAMS_SINUMERIK && s->cutter_unread)
-        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_CORNERS_OF_G41});
+    if (s->cutter_ways & S_WAY_KONT)
+        report(b, F_DIALECT_STATEMENT, (Says){.a = DR_REASON_KONT});
     const double diameter_mm = diameter(b, code);
     s->cutter_mode |= S_CUTTER_ON;
     s->cutter_code = code;
@@ -136,6 +170,8 @@ static void turn_on(Block *b, int32_t code) {
     const bool moves_nothing = isnan(diameter_mm) || s->plane == V_PLANE_YZ || b->machine->d_holds == D_D_IS_WEAR;
     s->cutter_radius_mm = moves_nothing ? 0.0 : 0.5 * fabs(diameter_mm);
     s->cutter_entered = s->cutter_failed = s->cutter_led = 0;
+    s->cutter_idle = 0;
+    s->cutter_shift_mm_s = b->machine->shifts_alone ? speed_of_shift(b) : 0.0;
     s->cutter_other_mm[0] = s->cutter_other_mm[1] = 0.0;
     if (!isnan(diameter_mm) && b->machine->d_holds != D_D_IS_WEAR)
         compare_with_tool(b, diameter_mm);
@@ -145,8 +181,7 @@ static void turn_on(Block *b, int32_t code) {
 void cutter_compensation(Block *b) {
     const int32_t code = b->g[V_RADIUS_COMPENSATION];
     if (code == V_G40) {
-        b->state->cutter_other_mm[0] = b->state->cutter_other_mm[1] = 0.0;
-        end_compensation(b);
+        turn_off(b);
     } else if (code >= 0) {
         b->used[V_WORD_D] |= b->has[V_WORD_D];
         b->used[V_WORD_L] |= b->has[V_WORD_L];

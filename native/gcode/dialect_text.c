@@ -275,7 +275,7 @@ static int64_t cycle_call(Scan *scan, Evaluation *e, int64_t i, int64_t number_o
 /* Write what the statement makes whose name stands from i to end. */
 static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
-    const int32_t kind = kind_of(scan, i, end);
+    const int32_t kind = kind_of(scan, i, end + stands_at(text, end, '['));
     const int64_t behind = behind_blanks(text, end);
     const bool is_assigned = stands_at(text, behind, '=');
     switch (kind < 0 ? -1 : kind % D_KIND_STEP) {
@@ -291,9 +291,10 @@ static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int6
         break;
     case D_JUMP: return e == NULL ? NEEDS_LINE : refuse(scan, e, i, line, DR_REASON_FLOW);
     case D_DEFINE: return e == NULL ? NEEDS_LINE : define_variables(e, end);
+    case D_ARRAY: return e == NULL ? NEEDS_LINE : assign_variable(e, i);
     case D_VARIABLE:
         if (is_assigned)
-            return e == NULL ? NEEDS_LINE : assign_variable(e, kind / D_KIND_STEP, i, behind + 1);
+            return e == NULL ? NEEDS_LINE : assign_variable(e, i);
         break;
     case D_MESSAGE:
         if (e != NULL)
@@ -351,9 +352,11 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
     while (behind < text.rows && is_digit(AT(text, behind)))
         behind++;
     const int64_t equals = behind_blanks(text, behind);
+    const int letter = AT(text, i) & ~CH_CASE_BIT;
+    if (letter == 'R' && behind == i + 1 && stands_at(text, behind, '['))
+        return e == NULL ? NEEDS_LINE : assign_variable(e, i);
     if (!stands_at(text, equals, '='))
         return i;
-    const int letter = AT(text, i) & ~CH_CASE_BIT;
     const bool numbered = behind > i + 1;
     const bool first_one = behind == i + 2 && AT(text, i + 1) == '1';
     if (letter == 'T' && !numbered && stands_at(text, behind_blanks(text, equals + 1), '"'))
@@ -371,7 +374,7 @@ static int64_t word_with_equals(Scan *scan, Evaluation *e, int64_t i, int64_t li
         return assigned(scan, e, letter, equals + 1, line, 0.0);
     }
     if (letter == 'R' && numbered)
-        return e == NULL ? NEEDS_LINE : assign_r(e, i, behind, equals + 1);
+        return e == NULL ? NEEDS_LINE : assign_variable(e, i);
     if (letter == 'R' || letter == 'N' || letter == 'O' ||
         (numbered && !(first_one && (letter == 'S' || letter == 'M'))))
         return refuse(scan, e, i, line, DR_REASON_VALUES);

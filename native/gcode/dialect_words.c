@@ -130,9 +130,9 @@ static void take_call(Block *b, uint8_t c, double value) {
 /* Take KONT and NORM: how a Sinumerik leads in. */
 static void take_approach(Block *b, bool along_contour) {
     if (along_contour)
-        b->state->cutter_unread |= S_UNREAD_APPROACH;
+        b->state->cutter_ways |= S_WAY_KONT;
     else
-        b->state->cutter_unread &= ~S_UNREAD_APPROACH;
+        b->state->cutter_ways &= ~S_WAY_KONT;
     note(b, S_NOTE_STATEMENT, 0);
 }
 
@@ -200,10 +200,10 @@ int32_t core_code(Block *b, int64_t written, bool *good) {
     } else if (code == D_CODE_NO_OFFSET) {
         b->state->zero_in_doubt = S_ZERO_OFF;
     } else if (code == D_CODE_CORNER_ARC) {
-        b->state->cutter_unread &= ~S_UNREAD_CORNERS;
+        b->state->cutter_ways &= ~S_WAY_MEETING;
         note(b, S_NOTE_CODE, (int32_t)written);
     } else if (code == D_CODE_CORNER_MEETING) {
-        b->state->cutter_unread |= S_UNREAD_CORNERS;
+        b->state->cutter_ways |= S_WAY_MEETING;
         note(b, S_NOTE_CODE, (int32_t)written);
     } else if (code == D_CODE_EXACT) {
         b->exact_once = true;

@@ -68,16 +68,18 @@ static bool straight(Block *b, bool by_machine) {
     if (s->cutter_mode & S_CUTTER_BESIDE && b->machine->lead && !by_machine && !lead_out(b, to_mm, mm_s))
         return false;
     s->cutter_mode &= ~S_CUTTER_BESIDE;
-    if (compensates(s)) {
-        learn(b);
-        const bool done = compensated_line(b, to_mm, mm_s);
-        stand_at(s, to_mm);
-        return done;
-    }
     if (s->corner && may_round(b, to_mm, by_machine, mm_s) && !round_corner(b, to_mm))
         return false;
     const double from_mm[3] = {s->x, s->y, s->z};
     const bool from_known = s->known_x && s->known_y && s->known_z;
+    if (compensates(s)) {
+        learn(b);
+        const bool done = compensated_line(b, to_mm, mm_s);
+        stand_at(s, to_mm);
+        if (done && b->corner && from_known)
+            begin_corner(b, from_mm, by_machine, mm_s);
+        return done;
+    }
     stand_at(s, to_mm);
     stand_turned(s, b->turn_deg);
     if (by_machine)

@@ -14,6 +14,7 @@
 #include "gcode/motion.h"
 #include "gcode/reporting.h"
 #include "gcode/rows.h"
+#include "gcode/siemens_patterns.h"
 
 enum { RTP, RFP, SDIS, DP, DPR, DTB };
 enum { FDEP = 5, FDPR, DAM, PECK_DTB, DTS, FRF, VARI, PECK_AXN, MDEP, VRT, DTD, DIS1 };               /* CYCLE83 */
@@ -307,6 +308,8 @@ static bool drill(Block *b, double mm_s) {
         refuse_under_compensation(b, s->cutter_code);
         return true;
     }
+    if (s->zero_in_doubt)
+        return !refuse(b, s->zero_in_doubt == S_ZERO_OFF ? DR_REASON_NO_OFFSET : DR_REASON_ZERO_AND_TIP);
     c.motion = b->cycle;
     if (!take_arguments(b, &c))
         return true;
@@ -354,6 +357,8 @@ bool cycle_call(Block *b) {
         return !refuse(b, DR_REASON_CYCLE_BESIDE);
     if (b->cycle == V_CYCLE_SWIVEL)
         return swivel(b);
+    if (is_pattern(b->cycle))
+        return drill_pattern(b);
     if (!b->modal)
         return drill(b, 0.0);
     s->modal_call = 0;

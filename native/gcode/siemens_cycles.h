@@ -1,4 +1,4 @@
-/* CYCLE81 and CYCLE82 of a Sinumerik, at once or behind each move (MCALL). */
+/* Drilling cycles of a Sinumerik, at once or behind each move (MCALL). */
 
 #ifndef GCODE_SIEMENS_CYCLES_H
 #define GCODE_SIEMENS_CYCLES_H

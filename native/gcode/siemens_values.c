@@ -1,4 +1,4 @@
-/* R parameters, variables and expressions of a Sinumerik: X=R1+5, R2=SIN(R3)*4, DEF REAL WIDTH=20.
+/* R parameters, variables, arrays and expressions of a Sinumerik: X=R1+5, R2=SIN(R3)*4, DEF REAL WIDTH=20, DEPTH[3].
 
    What is not named here ends the expression, and what then follows is refused with its line. One comparison stands in
    a bracket, and AND, OR, XOR take what is true or false: they go before comparisons on this control (SINUMERIK 840D sl,
@@ -17,6 +17,21 @@ static double expression(Evaluation *e, int64_t *i);
 static bool stands_at(const Evaluation *e, int64_t i, uint8_t c) { return i < e->end && AT(e->program->text, i) == c; }
 
 static int64_t behind_blanks(const Evaluation *e, int64_t i) { return after_blanks(e->program->text, i, e->end); }
+
+/* Return the place behind the name that stands at i. */
+static int64_t after_names(Bytes text, int64_t i) {
+    while (i < text.rows && is_of_name(AT(text, i)))
+        i++;
+    return i;
+}
+
+/* Return the place behind a name of small letters that stands at i, i where it does not. */
+static int64_t behind_keyword(const Evaluation *e, int64_t i, const char *name) {
+    int64_t k = i;
+    for (; *name && k < e->end && (AT(e->program->text, k) | CH_CASE_BIT) == (uint8_t)*name; name++)
+        k++;
+    return *name || (k < e->end && is_of_name(AT(e->program->text, k))) ? i : k;
+}
 
 /* --- R parameters --------------------------------------------------------------------------------------- */
 
@@ -62,17 +77,54 @@ static void keep(Evaluation *e, int64_t number, double value, int64_t place) {
     Course *at = e->program->course.at;
     if (is_assigned_here(e, number))
         wrong(e, F_EXPRESSION, PF_SIEMENS_SAME_BLOCK, 0.0, place);
+    if (at->assignments >= e->program->assignments.rows)
+        wrong(e, F_EXPRESSION, PF_SIEMENS_DEF, 0.0, place);
     if (e->finding == F_OK)
         AT(e->program->assignments, at->assignments++) = (Assignment){NO_NAME, number, of_type(number, value)};
 }
 
-/* R1=..., whose R stands at `place`, with its digits before `behind` and its value from `value` on; return the place
-   behind. */
-int64_t assign_r(Evaluation *e, int64_t place, int64_t behind, int64_t value) {
-    const int64_t number = r_number(e, place + 1, behind, place);
-    const double result = siemens_value(e, &value);
-    keep(e, number, result, place);
-    return value;
+/* --- arrays --------------------------------------------------------------------------------------------- */
+
+/* Go behind the character that must stand at i. */
+static void require(Evaluation *e, int64_t *i, uint8_t c, int fault) {
+    *i = behind_blanks(e, *i);
+    if (e->finding == F_OK && !stands_at(e, *i, c))
+        wrong(e, F_EXPRESSION, fault, 0.0, least(*i, e->end - 1));
+    ++*i;
+}
+
+/* Read an index that is a whole number from 0 to below `count`. */
+static int64_t index_at(Evaluation *e, int64_t *i, int64_t count) {
+    const int64_t place = *i;
+    int64_t index = 0;
+    const double value = siemens_value(e, i);
+    if (e->finding == F_OK && (!whole_number(value, &index) || index < 0 || index >= count))
+        return (int64_t)wrong(e, F_EXPRESSION_VALUE, PF_SIEMENS_INDEX, value, place);
+    return index;
+}
+
+static int64_t last_of(const Array *array) { return array->first + array->rows * most(1, array->columns) - 1; }
+
+/* Return the array whose name stands at `place` with its [ before `behind`, NULL for none. */
+static const Array *array_at(const Evaluation *e, int64_t place, int64_t behind) {
+    const Program *p = e->program;
+    const int32_t kind = statement_kind(p->text, p->statement_names, p->statement_kinds, place, behind);
+    return kind >= 0 && kind % D_KIND_STEP == D_ARRAY ? &AT(p->arrays, kind / D_KIND_STEP) : NULL;
+}
+
+/* Return the number of the element whose array is named at `place` and whose [ stands at i, and go behind its ]. */
+static int64_t element_at(Evaluation *e, int64_t place, int64_t *i) {
+    const Array *array = array_at(e, place, ++*i);
+    const bool of_r = *i == place + 2 && (AT(e->program->text, place) & ~CH_CASE_BIT) == 'R';
+    if (array == NULL && !of_r)
+        return (int64_t)wrong(e, F_EXPRESSION, PF_SIEMENS_VALUE, 0.0, place);
+    int64_t row = index_at(e, i, of_r ? P_MOST_R : array->rows);
+    if (!of_r && array->columns > 0) {
+        require(e, i, ',', PF_SIEMENS_INDICES);
+        row = row * array->columns + index_at(e, i, array->columns);
+    }
+    require(e, i, ']', PF_SIEMENS_INDICES);
+    return of_r ? row : array->first + row;
 }
 
 /* --- variables ------------------------------------------------------------------------------------------ */
@@ -93,7 +145,7 @@ int32_t statement_kind(Bytes text, Bytes names, Ints32 kinds, int64_t i, int64_t
     return -1;
 }
 
-/* Return the number of the R parameter or variable whose name stands at i, and go behind it; -1 for none. */
+/* Return the number of the R parameter, variable or element whose name stands at i, and go behind it; -1 for none. */
 static int64_t variable_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;
     const int64_t place = *i;
@@ -104,8 +156,11 @@ static int64_t variable_at(Evaluation *e, int64_t *i) {
         *i = behind;
         return r_number(e, place + 1, behind, place);
     }
-    while (behind < e->end && is_of_name(AT(text, behind)))
-        behind++;
+    behind = after_names(text, place);
+    if (stands_at(e, behind, '[')) {
+        *i = behind;
+        return element_at(e, place, i);
+    }
     const int32_t kind = statement_kind(text, e->program->statement_names, e->program->statement_kinds, place, behind);
     if (behind == place || kind < 0 || kind % D_KIND_STEP != D_VARIABLE)
         return -1;
@@ -113,11 +168,68 @@ static int64_t variable_at(Evaluation *e, int64_t *i) {
     return kind / D_KIND_STEP;
 }
 
-/* WIDTH=..., whose number is known and whose value stands at `value`; return the place behind. */
-int64_t assign_variable(Evaluation *e, int64_t number, int64_t place, int64_t value) {
-    const double result = siemens_value(e, &value);
+/* Return the place behind a name of small letters and its ( that stand at i, i where they do not. */
+static int64_t behind_call(const Evaluation *e, int64_t i, const char *name) {
+    const int64_t open = behind_blanks(e, behind_keyword(e, i, name));
+    return open > i && stands_at(e, open, '(') ? open + 1 : i;
+}
+
+/* Give an element and those behind it up to `last` the values at i, SET(1,2,3) or REP(0); return how many have got one, 0
+   where neither stands there, and go behind it. */
+static int64_t values_of_array(Evaluation *e, int64_t *i, int64_t first, int64_t last) {
+    const int64_t place = *i, set = behind_call(e, place, "set"), rep = behind_call(e, place, "rep");
+    int64_t number = first;
+    *i = most(set, rep);
+    for (bool more = *i > place; more && e->finding == F_OK; ++*i) {
+        const double value = siemens_value(e, i);
+        *i = behind_blanks(e, *i);
+        more = set > place && stands_at(e, *i, ',');
+        const int64_t until = rep > place ? last : number;
+        if (until > last || (!more && !stands_at(e, *i, ')')))
+            wrong(e, F_EXPRESSION, PF_SIEMENS_INDICES, 0.0, place);
+        for (; number <= until && e->finding == F_OK; number++)
+            keep(e, number, value, place);
+    }
+    return number - first;
+}
+
+/* WIDTH=..., R1=..., DEPTH[2]=..., DEPTH[0]=SET(1,2); return the place behind. */
+int64_t assign_variable(Evaluation *e, int64_t i) {
+    const int64_t place = i, number = variable_at(e, &i);
+    if (e->finding == F_OK && number < 0)
+        wrong(e, F_EXPRESSION, PF_SIEMENS_VALUE, 0.0, place);
+    require(e, &i, '=', PF_SIEMENS_VALUE);
+    i = behind_blanks(e, i);
+    const Array *array = NULL;
+    for (int64_t k = 0; k < e->program->arrays.rows; k++)
+        if (number >= AT(e->program->arrays, k).first && number <= last_of(&AT(e->program->arrays, k)))
+            array = &AT(e->program->arrays, k);
+    if (e->finding == F_OK && array != NULL && values_of_array(e, &i, number, last_of(array)) > 0)
+        return i;
+    const double result = e->finding == F_OK ? siemens_value(e, &i) : 0.0;
     keep(e, number, result, place);
-    return value;
+    return i;
+}
+
+/* Define the array whose name stands at `place` with its [ before i: its elements get the values behind =, else 0; return the
+   place behind. */
+static int64_t define_array(Evaluation *e, int64_t place, int64_t i) {
+    const Array *array = array_at(e, place, i);
+    int64_t given = 0;
+    if (array == NULL)
+        return wrong(e, F_EXPRESSION, PF_SIEMENS_DEF, 0.0, place), e->end;
+    while (i < e->end && AT(e->program->text, i) != ']')
+        i++;
+    i = behind_blanks(e, i + 1);
+    if (stands_at(e, i, '=')) {
+        i = behind_blanks(e, i + 1);
+        given = values_of_array(e, &i, array->first, last_of(array));
+        if (given == 0)
+            wrong(e, F_EXPRESSION, PF_SIEMENS_INDICES, 0.0, least(i, e->end - 1));
+    }
+    for (int64_t number = array->first + given; number <= last_of(array) && e->finding == F_OK; number++)
+        keep(e, number, 0.0, place);
+    return i;
 }
 
 /* DEF REAL WIDTH=20, DEPTH: each variable of the line from i on gets its value, 0 where none is stated; return the place
@@ -127,7 +239,12 @@ int64_t define_variables(Evaluation *e, int64_t i) {
     for (i = behind_blanks(e, i); i < e->end && is_letter(AT(text, i)); i++)
         ; /* the type */
     do {
-        const int64_t place = i = behind_blanks(e, i), number = variable_at(e, &i);
+        const int64_t place = i = behind_blanks(e, i), name = after_names(text, i);
+        if (stands_at(e, name, '[')) {
+            i = behind_blanks(e, define_array(e, place, name + 1));
+            continue;
+        }
+        const int64_t number = variable_at(e, &i);
         double value = 0.0;
         if (number < P_FIRST_REAL)
             return wrong(e, F_EXPRESSION, PF_SIEMENS_DEF, 0.0, least(place, e->end - 1)), e->end;
@@ -185,14 +302,6 @@ static double function_of(Evaluation *e, Function function, double x, int64_t pl
     }
 }
 
-/* Go behind the character that must stand at i. */
-static void require(Evaluation *e, int64_t *i, uint8_t c, int fault) {
-    *i = behind_blanks(e, *i);
-    if (e->finding == F_OK && !stands_at(e, *i, c))
-        wrong(e, F_EXPRESSION, fault, 0.0, least(*i, e->end - 1));
-    ++*i;
-}
-
 static double call_at(Evaluation *e, int64_t *i, Function function, int64_t place) {
     const double first = expression(e, i);
     double second = 0.0;
@@ -213,14 +322,6 @@ static double call_at(Evaluation *e, int64_t *i, Function function, int64_t plac
 }
 
 /* --- values --------------------------------------------------------------------------------------------- */
-
-/* Return the place behind a name of small letters that stands at i, i where it does not. */
-static int64_t behind_keyword(const Evaluation *e, int64_t i, const char *name) {
-    int64_t k = i;
-    for (; *name && k < e->end && (AT(e->program->text, k) | CH_CASE_BIT) == (uint8_t)*name; name++)
-        k++;
-    return *name || (k < e->end && is_of_name(AT(e->program->text, k))) ? i : k;
-}
 
 static double unsigned_at(Evaluation *e, int64_t *i) {
     const Bytes text = e->program->text;

@@ -49,6 +49,20 @@ PROGRAMS = [
         "X=R1*10\n"
         "IF R1<4 GOTOB AG\nMCALL CYCLE81(10,0,2,-5,0)\nX1\nMCALL CYCLE82(10,0,2,0,4,0)\nX2\nMCALL\nM30",
     ),
+    (
+        "sinumerik",
+        "MCALL CYCLE81(10,0,2,-5,0)\nHOLES1(20,10,30,5,12,4)\nHOLES1(20,10,30,5,12,4)\nHOLES2(50,60,20,15,0,5)\n"
+        "HOLES2(50,60,20,15,-30,3)\nCYCLE801(100,-20,20,15,10,3,4)\nCYCLE801(100,-20,20,10,15,3,4)\nMCALL\nG0 X1\nM30",
+    ),
+    (
+        "sinumerik",
+        "TRANS X5 Y7\nMCALL CYCLE82(10,0,2,-5,0,0.5)\nX200 Y100\nCYCLE801(10,20,0,15,10,2,3)\nHOLES1(0,0,180,5,12,3)\nMCALL\nM30",
+    ),
+    (
+        "sinumerik",
+        "DEF REAL WEG[4]=SET(1,2.5,4), HOCH=3\nDEF INT FELD[2,3]=REP(7)\nWEG[3]=WEG[1]*2\nFELD[1,2]=HOCH\n"
+        "FOR R1=0 TO 3\nX=WEG[R1] Y=FELD[1,R1 MOD 3]\nENDFOR\nR[R1+1]=8\nX=R5 Y=R[5]+1\nM30",
+    ),
     ("heidenhain", "3 CC X+10 Y+0\n4 C X+20 Y+0 DR- F100\n5 L IX+5 IZ-2\n6 CR X+30 Y+5 R+5 DR+\n7 L M30"),
     (
         "heidenhain",

@@ -67,6 +67,21 @@ def test_type_b_goes_around_the_corner():
     np.testing.assert_allclose(way(SHARP, "b")[:4], expected[:4], atol=1e-9)
 
 
+@pytest.mark.parametrize(("lead_in", "corner"), [("c-a", []), ("c-b", [[20, -5], [25, -5]])])
+def test_type_c_shifts_the_tool_by_itself_where_its_block_has_no_move(lead_in, corner):
+    """At right angles to the next and the last block, with the motion code of G41 and G40; else as type A or B."""
+    alone = read("G42 D1\nG1 X20.\nY20.\nG40\nZ9.", lead_in)
+    expected = [[0, -5, 5], [20, -5, 5], [25, -5, 5], [25, 20, 5], [20, 20, 5], [20, 20, 9]]
+    np.testing.assert_allclose(alone.position_mm[2:], expected, atol=1e-9)
+    assert np.isinf(alone.feed_mm_s[2:]).tolist() == [True, *5 * [False]]
+    assert alone.source_line[2:].tolist() == [7, 8, 9, 9, 10, 11]
+    around = read("G42 D1\nG2 X10. Y-10. J-10.\nG1 G40", lead_in).position_mm[2:-1, :2]
+    np.testing.assert_allclose(np.hypot(*(around[:-1] - [0, -10]).T), 5, atol=1e-9)
+    np.testing.assert_allclose(around[-2:], [[5, -10], [10, -10]], atol=1e-9)
+    assert way(OUTSIDE, lead_in)[: len(corner)] == corner
+    assert way(OUTSIDE, lead_in) == way(OUTSIDE, lead_in[-1])
+
+
 def test_an_outside_corner_of_a_fanuc_has_no_arc():
     contour = "G42 D1 G1 X20.\nY20.\nX0.\nG40 Y40."
     assert way(contour)[1:3] == [[25, 20], [25, 25]]
@@ -101,6 +116,11 @@ def test_d_holds_radius_diameter_or_wear():
         ("G42 D1 G1 X20.\nY20.\nG40\nZ9.", (), ("dialect-statement", 10)),
         ("G42 D1 G2 X20. Y0. I10.", (), ("dialect-statement", 7)),
         ("G42 D1 G1 X20.\nG2 X24. I2.\nG1 Y9.", (), ("cutter-arc", 8)),
+        ("G1\nG42 D1\nM8\nX20.", ("c-a",), ("dialect-statement", 10)),
+        ("G1\nG42 D1 Z1.\nX20.", ("c-a",), ("dialect-statement", 8)),
+        ("G1\nG42 D1\nX20.\nG40 Z9.", ("c-a",), ("dialect-statement", 10)),
+        ("G1\nG42 D1\nG40\nX20.", ("c-a",), ("dialect-statement", 9)),
+        ("G1\nG42 D1\nG2 X20. I10.\nG40", ("c-a",), ("dialect-statement", 10)),
         ("G10 L12 P1 R5.1", (), ("dialect-code", 7)),
         ("G10 L12 P1 R5.", (None,), ("dialect-code", 7)),
         ("G10 L11 P1 R1.", (), ("dialect-code", 7)),

@@ -2,16 +2,17 @@
 plain Python.
 
 Nothing of the package is used. Only places are worked out: of moves, arcs' ends, drilled holes, subprograms,
-jumps and loops, in G17, without compensation of the cutter and without rotary axes. `columns` makes of
-places what
-two readings can be compared by: at each X and Y the lowest, highest and last Z, as the strokes of a hole
-differ by
-parameters. What this does not know raises `Unknown`, and the program is not compared.
+jumps and loops, in G17, without rotary axes; beside a compensated contour, at one height, by `contour`. `columns`
+makes of places what two readings can be compared by: at each X and Y the lowest, highest and last Z, as the
+strokes of a hole differ by parameters. What this does not know raises `Unknown`, and the program is not compared.
 """
 
+import cmath
 import functools
 import math
 import re
+
+from tests.reference import contour
 
 MOST_PLACES, SAME_MM = 2_000_000, 1e-7
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -53,7 +54,10 @@ def difference(ours, theirs, within_mm=1e-6):
 
 
 class _Machine:
-    def __init__(self):
+    def __init__(self, radius=None):
+        """Take the radius of every tool, None where it is not known."""
+        self.radius, self.side, self.corners = radius, 0, "arc"
+        self.elements, self.roundings, self.is_led, self.corner = [], [], False, None
         self.at = {"X": None, "Y": None, "Z": None}
         self.places, self.absolute, self.unit = [], True, 1.0
         self.shift = {"X": 0.0, "Y": 0.0, "Z": 0.0}
@@ -71,6 +75,51 @@ class _Machine:
         if self.at[axis] is None:
             raise Unknown("counted from nowhere")
         return self.at[axis] + value
+
+    def switch(self, side):
+        """Begin a compensated contour on a side, 1 left of it, or end it with 0."""
+        if side and self.radius is None:
+            raise Unknown("radius of the tool")
+        if side == self.side:
+            return
+        if self.elements:
+            path = contour.tool_path(self.elements, self.side, self.radius, self.corners, self.roundings)
+            self.places += [(p.real, p.imag, self.at["Z"]) for p in path]
+        self.elements, self.roundings, self.is_led, self.side = [], [], False, side
+
+    def move(self, to, centre=None, turn=0, corner=None, feeds=True):
+        """Go to where axes lead, straight or by an arc; ``corner`` is what is made behind this move."""
+        before = dict(self.at)
+        here = None if None in (before["X"], before["Y"]) else complex(before["X"], before["Y"])
+        after = {**before, **to}
+        across = here is not None and None not in (after["X"], after["Y"]) and here != complex(after["X"], after["Y"])
+        if self.side and (across or turn) and not self.is_led:
+            if turn or corner:
+                raise Unknown("an arc or a corner leads in")
+            self.is_led = True
+        elif self.side and self.is_led:
+            if not (across or turn) or "Z" in to:
+                raise Unknown("a move along the tool beside a contour")
+            self.elements.append((here, complex(after["X"], after["Y"]), centre, turn))
+            self.roundings.append(corner)
+        elif corner or self.corner:
+            self._round(here, complex(after["X"], after["Y"]), turn, corner, feeds)
+        elif not self.side or not self.elements:
+            self.go(**to)
+        self.at = after
+
+    def _round(self, here, there, turn, corner, feeds):
+        if turn or not feeds:
+            raise Unknown("a corner beside an arc or a rapid")
+        if self.corner:
+            before, kind, value = self.corner
+            made = contour.rounded([before, contour.line(here, there)], [(kind, value), None])
+            for element in made[1:]:
+                self.go(X=element[0].real, Y=element[0].imag)
+            here = made[-1][0]
+        self.corner = (contour.line(here, there), *corner) if corner else None
+        if not corner:
+            self.go(X=there.real, Y=there.imag)
 
     def hole(self, approach, bottom, leave):
         for z in (approach, bottom, leave):
@@ -198,7 +247,7 @@ def _code(text):
 def _value(text, variables):
     """Return the value of an expression of a Sinumerik or Heidenhain."""
     try:
-        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS}, variables))
+        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS, "R": _Parameters(variables)}, variables))
     except Exception as error:
         raise Unknown(text) from error
 
@@ -206,16 +255,58 @@ def _value(text, variables):
 _BRACKET = r"\([^()]*\)"
 for _ in range(3):  # brackets within brackets
     _BRACKET = rf"\((?:[^()]|{_BRACKET})*\)"
-_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();\[\]]|\[[^\]]*\]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _SAID = (
-    r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|NORM|CYCLE832\s*\([^)]*\)"
+    r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|F?NORM|CYCLE832\s*\([^)]*\)|TRAFOOF|CYCLE800\(\)|SETMS\(\d\)"
     r"|G64[0-9]*|ADIS\s*=\S+)"
 )
 
 
-def siemens(text, programs=None):
-    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name."""
-    run, variables = _Machine(), {f"R{n}": 0.0 for n in range(100)}
+class _Array:
+    """An array of a Sinumerik: indices are whole numbers from 0 on, one or two."""
+
+    def __init__(self, sizes):
+        self.sizes = [int(size) for size in sizes]
+        self.values = [0.0] * math.prod(self.sizes)
+
+    def place(self, index):
+        """Return the place of an element."""
+        index = index if isinstance(index, tuple) else (index,)
+        if len(index) != len(self.sizes) or any(i != int(i) or not 0 <= i < n for i, n in zip(index, self.sizes, strict=True)):
+            raise Unknown("index")
+        return int(index[0]) if len(index) == 1 else int(index[0]) * self.sizes[1] + int(index[1])
+
+    def __getitem__(self, index):
+        return self.values[self.place(index)]
+
+    def fill(self, first, text, variables):
+        """Give elements the values of SET(…) or REP(…), or one."""
+        m = re.match(r"(SET|REP)\((.*)\)$", text)
+        values = [_value(part, variables) for part in m[2].split(",")] if m else [_value(text, variables)]
+        if m and m[1] == "REP":
+            values *= len(self.values) - first
+        self.values[first : first + len(values)] = values
+
+
+class _Parameters:
+    """R parameters by a number that is worked out: R[R1+2]."""
+
+    def __init__(self, variables):
+        self.variables = variables
+
+    def __getitem__(self, index):
+        return self.variables[f"R{int(index)}"]
+
+
+def _outside_brackets(text):
+    """Return the parts of a text between the commas that stand in no bracket."""
+    return re.findall(r"(?:[^,(\[]|\([^()]*\)|\[[^\]]*\])+", text)
+
+
+def siemens(text, programs=None, radius=None):
+    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name, ``radius`` is
+    that of every tool."""
+    run, variables = _Machine(radius), {f"R{n}": 0.0 for n in range(100)}
     _siemens_program(text, run, variables, {"g": 0, "modal": None}, programs or {}, 0)
     return run.places
 
@@ -223,7 +314,7 @@ def siemens(text, programs=None):
 def _siemens_call(line, run, variables, state, programs, depth):
     """Run a subprogram that a line calls; return whether it is such a line."""
     m = re.match(r"([A-Z_]{2}\w*|L\d+)\s*(?:\((.*)\))?\s*(?:P\s*=?\s*(\d+))?$", line)
-    if m is None or m[1] not in programs:
+    if m is None or m[1] not in programs or m[1] in ("HOLES1", "HOLES2", "CYCLE801"):
         return False
     if depth > 8:
         raise Unknown("calls")
@@ -325,15 +416,32 @@ def _blocks(codes):
 def _siemens_block(line, run, variables, state):
     """Carry out one block; return whether the program ends."""
     if (m := re.match(r"DEF\s+(?:REAL|INT|BOOL)\s+(.*)$", line)) is not None:
-        for part in m[1].split(","):
+        for part in _outside_brackets(m[1]):
             name, _, value = part.partition("=")
-            variables[name.strip()] = _value(value, variables) if value else 0.0
+            sizes = re.match(r"\s*(\w+)\[(.*)\]\s*$", name)
+            if sizes:
+                variables[sizes[1]] = _Array(sizes[2].split(","))
+                if value:
+                    variables[sizes[1]].fill(0, value, variables)
+            else:
+                variables[name.strip()] = _value(value, variables) if value else 0.0
         return False
+    while (m := re.match(r"(\w+)\[([^=]*)\]=(\S+)\s*", line)) is not None:
+        index = tuple(_value(part, variables) for part in _outside_brackets(m[2]))
+        if m[1] == "R":
+            variables[f"R{int(index[0])}"] = _value(m[3], variables)
+        else:
+            array = variables[m[1]]
+            array.fill(array.place(index), m[3], variables)
+        line = line[m.end() :]
     line = re.sub(_SAID, " ", line)
     if line.startswith("%") or line.startswith("WORKPIECE"):
         return False
     modal = "MCALL" in line
     cycle = re.search(r"CYCLE(8[123])\s*\((.*)\)", line)
+    if (pattern := re.match(r"(HOLES1|HOLES2|CYCLE801)\((.*)\)$", line)) is not None:
+        _siemens_pattern(pattern[1], [_value(part, variables) if part else 0.0 for part in pattern[2].split(",")], run, state)
+        return False
     if cycle or modal:
         hole = _siemens_hole(cycle, variables) if cycle else None
         if modal:
@@ -349,13 +457,18 @@ def _siemens_block(line, run, variables, state):
         raise Unknown(line)
     gs = {float(v) for a, v in words if a == "G"}
     ms = {float(v) for a, v in words if a == "M"}
-    if gs & {41, 42, 18, 19, 110, 111, 112, 58, 59, 33, 331, 70}:
+    if gs & {18, 19, 110, 111, 112, 58, 59, 33, 331, 70}:
         raise Unknown("G-code")
     run.unit = 25.4 if 700 in gs else 1.0 if gs & {71, 710} else run.unit
     run.absolute = True if 90 in gs else False if 91 in gs else run.absolute
     moves = {int(g) for g in gs} & {0, 1, 2, 3}
     state["g"] = moves.pop() if moves else state["g"]
-    to = {}
+    if gs & {450, 451} and run.elements:
+        raise Unknown("other corners within a contour")
+    run.corners = "meeting" if 451 in gs else "arc" if 450 in gs else run.corners
+    if gs & {40, 41, 42}:
+        run.switch(1 if 41 in gs else -1 if 42 in gs else 0)
+    to, corner, words_of_arc = {}, None, {}
     for address, value in words:
         if address in ("X", "Y", "Z"):
             way = value[:2] if value[:2] in ("AC", "IC") else ""
@@ -365,7 +478,13 @@ def _siemens_block(line, run, variables, state):
             )
         elif address in variables:
             variables[address] = _value(value, variables)
-        elif address not in ("G", "M", "F", "S", "T", "D", "N", "I", "J", "K", "CR", "TURN", "P", "S1", "H"):
+        elif address in ("RND", "CHR", "CHF"):
+            corner = (address, _value(value, variables) * run.unit)
+        elif address in ("I", "J", "CR"):
+            words_of_arc[address] = value
+        elif machine and address in ("A", "B", "C"):
+            continue
+        elif address not in ("G", "M", "F", "S", "T", "D", "N", "K", "TURN", "P", "S1", "H"):
             raise Unknown(address)
     if frame:
         for axis in run.shift:
@@ -375,10 +494,65 @@ def _siemens_block(line, run, variables, state):
         for axis in to:
             run.at[axis] = None
     elif 4 not in gs and (to or (state["g"] > 1 and any(a in ("I", "J") for a, _ in words))):
-        run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        there = {axis: run.target(axis, *value) for axis, value in to.items()}
+        run.move(there, *_siemens_arc(run, there, words_of_arc, state["g"], variables), corner, state["g"] > 0)
         if state["modal"]:
             run.hole(*state["modal"])
     return bool(ms & {2, 17, 30})
+
+
+def _siemens_arc(run, to, words, g, variables):
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out under G41 alone."""
+    if g < 2:
+        return None, 0
+    turn = 1 if g == 3 else -1
+    if not run.side:
+        return None, turn
+    if "CR" not in words:
+        parts = []
+        for axis, letter in (("X", "I"), ("Y", "J")):
+            value = words.get(letter, "0")
+            absolute = value.startswith("AC")
+            part = _value(value[2:] if absolute else value, variables) * run.unit
+            parts.append(part + (run.shift[axis] if absolute else run.at[axis]))
+        return complex(*parts), turn
+    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    return _centre(here, there, _value(words["CR"], variables) * run.unit, turn), turn
+
+
+def _centre(here, there, radius, turn):
+    """Return the centre of the arc of a radius, below 0 the longer one."""
+    half = (there - here) / 2
+    away = math.sqrt(max(0.0, radius**2 - abs(half) ** 2)) * (1 if radius > 0 else -1)
+    return here + half + turn * 1j * half / abs(half) * away
+
+
+def _siemens_pattern(name, given, run, state):
+    """Drill a row, a circle or a grid of holes from where the tool stands."""
+    here = complex(run.at["X"] - run.shift["X"], run.at["Y"] - run.shift["Y"])
+    begin = complex(given[0], given[1])
+    if name == "HOLES2":
+        radius, first, step, count = abs(given[2]), given[3], given[4], int(given[5])
+        step = step or 360 / count
+        places = [begin + radius * cmath.exp(1j * math.radians(first + k * step)) for k in range(count)]
+    else:
+        way = cmath.exp(1j * math.radians(given[2]))
+        if name == "HOLES1":
+            places = [begin + (given[3] + k * given[4]) * way for k in range(int(given[5]))]
+            if abs(here - places[-1]) < abs(here - places[0]):
+                places.reverse()
+        else:
+            d1, d2, n1, n2 = given[3], given[4], int(given[5]), int(given[6])
+            at = (here - begin) / way
+            xs, ys = [k * d1 for k in range(n1)], [k * d2 for k in range(n2)]
+            xs = xs[::-1] if at.real > xs[-1] / 2 else xs
+            ys = ys[::-1] if at.imag > ys[-1] / 2 else ys
+            outer, inner = (ys, xs) if d1 <= d2 else (xs, ys)
+            grid = [(a, c) for k, a in enumerate(outer) for c in (inner if k % 2 == 0 else inner[::-1])]
+            places = [begin + (complex(c, a) if d1 <= d2 else complex(a, c)) * way for a, c in grid]
+    for place in places:
+        run.go(X=place.real + run.shift["X"], Y=place.imag + run.shift["Y"])
+        run.hole(*state["modal"])
 
 
 def _siemens_hole(cycle, variables):
@@ -390,8 +564,8 @@ def _siemens_hole(cycle, variables):
     return rfp + (sdis or 0.0), rfp - dpr if dpr else dp, rtp
 
 
-def heidenhain(text):
-    """Return the places of a conversational program."""
+def heidenhain(text, radius=None):
+    """Return the places of a conversational program; ``radius`` is that of every tool."""
     logical = []
     for line in text.splitlines():
         goes_on = line.rstrip().endswith("~")
@@ -402,10 +576,24 @@ def heidenhain(text):
             logical.append((code, goes_on))
     codes = [re.sub(r"\bCYCLE DEF\b", "CYCL DEF", code.replace(",", ".")) for code, _ in logical]
     labels = {m[1]: k for k, code in enumerate(codes) if (m := re.match(r"LBL (\S+)$", code)) and m[1] != "0"}
-    run, q = _Machine(), {}
+    codes = _with_corners(codes)
+    run, q = _Machine(radius), {}
     state = {"pole": {}, "hole": None}
     _heidenhain_lines(codes, 0, labels, run, q, state, 0)
     return run.places
+
+
+def _with_corners(codes):
+    """Return the lines, those of RND and CHF behind the line to whose end they belong."""
+    found = []
+    for code in codes:
+        if (m := re.match(r"(RND|CHF) ?R?([\d.]+)(?: F\S+)?$", code)) is not None and found:
+            at = next(k for k in reversed(range(len(found))) if found[k])
+            found[at] += f" [{'RND' if m[1] == 'RND' else 'CHR'} {m[2]}]"
+            found.append("")
+        else:
+            found.append(code)
+    return found
 
 
 def _heidenhain_lines(codes, k, labels, run, q, state, depth):
@@ -448,8 +636,12 @@ def _heidenhain_block(code, run, q, state):
             state["pole"][axis] = _value(value, q)
         return False
     if head in ("L", "C", "CR", "CT") or re.match(r"M\d", head):
-        if re.search(r"\bR[LR]\b|\b[ABC][+-]?\d|\bPLANE|\bM128", code):
-            raise Unknown("compensation or rotary axes")
+        code, _, behind = code.partition(" [")
+        corner = (behind.split(" ")[0], float(behind.split(" ")[1].rstrip("]"))) if behind else None
+        if re.search(r"\b[ABC][+-]?\d|\bPLANE|\bM128", code):
+            raise Unknown("rotary axes")
+        if (side := re.search(r"\bR([0LR])\b", code)) is not None:
+            run.switch({"0": 0, "L": 1, "R": -1}[side[1]])
         to = {}
         for incremental, axis, value in re.findall(r"(?:^| )(I?)([XYZ]) ?([+-]?[\dQ.]+)", code):
             to[axis] = (_value(value, q), bool(incremental))
@@ -457,8 +649,9 @@ def _heidenhain_block(code, run, q, state):
         if machine:
             for axis in to or {"Z": 0}:
                 run.at[axis] = None
-        elif to:
-            run.go(**{axis: run.target(axis, *value) for axis, value in to.items()})
+        elif to or head == "C":
+            there = {axis: run.target(axis, *value) for axis, value in to.items()}
+            run.move(there, *_heidenhain_arc(head, code, there, run, q, state), corner)
         if re.search(r"\bM99\b", code):
             run.hole(*_heidenhain_hole(run, state))
         return re.search(r"\bM(?:0?2|30)\b", code) is not None
@@ -467,6 +660,23 @@ def _heidenhain_block(code, run, q, state):
         run.go(Z=run.at["Z"] + (float(z[1]) if z else 0.0))
         return False
     raise Unknown(code)
+
+
+def _heidenhain_arc(head, code, to, run, q, state):
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out beside a contour alone."""
+    if head not in ("C", "CR", "CT"):
+        return None, 0
+    way = re.search(r"\bDR ?([+-])", code)
+    turn = 1 if way is None or way[1] == "+" else -1
+    if not run.side:
+        return None, turn
+    if head == "C":
+        return complex(state["pole"]["X"] + run.shift["X"], state["pole"]["Y"] + run.shift["Y"]), turn
+    if head == "CT":
+        raise Unknown("CT beside a contour")
+    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    radius = re.search(r"(?<!D)R ?([+-]?[\d.]+)", code)
+    return _centre(here, there, _value(radius[1], q), turn), turn
 
 
 def _heidenhain_hole(run, state):

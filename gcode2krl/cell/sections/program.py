@@ -60,7 +60,7 @@ class Start(Section):
 class Cutter(Section):
     """What a Fanuc's parameters say of cutter compensation (G41, G42); without both it is refused."""
 
-    lead_in: Literal["a", "b"] | None = None
+    lead_in: Literal["a", "b", "c-a", "c-b"] | None = None
     """Type A leads at right angles to the first move of the contour, type B around the corner (5003)."""
     d: Literal["radius", "diameter", "wear"] | None = None
     """What the offset D holds: the tool's radius, its diameter, or its wear alone."""
