@@ -1,5 +1,6 @@
 """Entry point ``gcode2krl``: the commands, the default command, and how errors leave the program."""
 
+import atexit
 import gc
 import os
 import sys
@@ -114,6 +115,7 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     reserve_standard_files()
     gc.set_threshold(_OBJECTS_BEFORE_A_SEARCH)
+    atexit.register(gc.freeze)  # Python searches all objects for cycles again as it ends, for 0.15 s
     for variable in MATRIX_VARIABLES:  # matrices are small: threads that wait took half of a diagnosis
         os.environ.setdefault(variable, "1")
     if "_GCODE2KRL_COMPLETE" in os.environ:

@@ -193,7 +193,7 @@ class Footprint:
 
     @cached_property
     def sums(self) -> Ints32:
-        """Return the marked cells before each row and column; few programs go so deep that they are needed."""
+        """Return the marked cells before each row and column; few programs go deep enough to need them."""
         rows, columns = self.mask.shape
         sums = np.zeros((rows + 1, columns + 1), dtype=np.int32)
         np.cumsum(np.cumsum(self.mask, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
