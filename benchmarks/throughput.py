@@ -6,7 +6,8 @@ meets is ``translate, as typed``: the command of the README with the built-in ce
 rasters: that of the README with a ball of 8 mm, and one of a flat mill of 16 mm on a part of 140 x 74 mm.
 Processor time stands beside the wall's, which rewards overlap too; it is the measure on a machine that does
 something else as well. Last comes what the removal does: cells looked at for each that is lowered (counted
-by the checked build), and how fast. Nothing is judged here: the figures are printed.
+by the checked build), how fast, and how fast FreeCAD's path simulator, which predicts no forces, removes the
+same moves from cells of the same size. Nothing is judged here: the figures are printed.
 
     python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
     python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
@@ -45,7 +46,7 @@ import gcode2krl  # noqa: E402
 
 # This process stays small (no numpy): Linux counts the parent's pages at the start of a child as its own.
 
-PEERS = ("rs274", "gcodeparser", "pygcode", "toppra")
+PEERS = ("rs274", "gcodeparser", "pygcode", "toppra", "freecad")
 YARDSTICK = "LinuxCNC rs274 -g, interprets only"
 AS_TYPED = "translate, as typed"
 AS_TYPED_FLAT = "translate, as typed, flat mill"
@@ -411,6 +412,7 @@ class Cells(NamedTuple):
     """Processor time of removal and reading, the commands' other stages left out."""
     lowest_per_s: float
     """Cells a second that ``np.minimum`` takes on the same field."""
+    cell_mm: float
 
 
 def cells_of(part: str) -> Cells:
@@ -444,27 +446,46 @@ def cells_of(part: str) -> Cells:
         np.minimum(height, lower, out=lower)
         best_s = min(best_s, time.process_time() - start)
     looked_at, lowered = (int(sum(grid.counted[k] for grid in grids)) for k in (0, 1))
-    return Cells(looked_at, lowered, sum(samples), sum(seconds), height.size / max(best_s, 1e-6))
+    lowest_per_s = height.size / max(best_s, 1e-6)
+    return Cells(looked_at, lowered, sum(samples), sum(seconds), lowest_per_s, removal.part.cell_mm[0])
 
 
-def print_cells(part: Path, name: str, folder: Path) -> None:
-    """Print what the removal of a part does: counted by the checked build, timed with the usual one."""
+def print_cells(part: Path, name: str, folder: Path) -> Cells | None:
+    """Print and return what a part's removal does: counted by the checked build, timed with the usual."""
     command = [sys.executable, str(Path(__file__).resolve()), "--cells-of", str(part)]
     usual, whole = run(command, folder), run(translate(part, str(folder / "cells.src")), folder)
     counting = run(command, folder, {"GCODE2KRL_CORE": "checked"})
     if problem := usual.problem or whole.problem:
         print(f"  {name:<8}{problem}")
-        return
+        return None
     timed = Cells(*json.loads(usual.output))
     whole_ns, own_ns = (seconds / timed.samples * 1e9 for seconds in (whole.processor_s, timed.seconds))
     line = f"  {name:<8}{whole_ns:16.0f}{own_ns:14.0f}"
     if counting.problem:
         print(f"{line}  not counted: `python native/build.py --checked` makes the build that counts")
-        return
+        return timed
     counted = Cells(*json.loads(counting.output))
     per_s = counted.lowered / timed.seconds
     looked_at = counted.looked_at / max(counted.lowered, 1)
     print(f"{line}{looked_at:12.2f}{per_s / 1e6:14.1f}{per_s / timed.lowest_per_s:14.2%}")
+    return timed
+
+
+def freecad_line(part: Path, name: str, ours: Cells, folder: Path) -> str:
+    """Return the sentence on FreeCAD's simulator with our size of cells; its Python is the system's."""
+    if shutil.which("freecadcmd") is None:
+        return "FreeCAD's simulator: not found (Debian packages freecad, freecad-python3)"
+    cutter = {"ball": ["8", "ball"], "flat": ["16", "flat"]}[name]
+    script = str(HERE / "peers" / "time_freecad.py")
+    once = run(["/usr/bin/python3", script, str(part), *cutter, str(ours.cell_mm)], folder)
+    if once.problem:
+        return f"FreeCAD's simulator: {once.problem}"
+    seconds, moves = (float(word) for word in once.output.split()[-2:])
+    its_us, own_us = seconds / moves * 1e6, ours.seconds / moves * 1e6
+    return (
+        f"{name}, cells of {ours.cell_mm:.3g} mm: FreeCAD's simulator {its_us:.1f} us a move, removal only; "
+        f"ours with forces {own_us:.1f} us, {its_us / own_us:.1f} x as fast"
+    )
 
 
 # --- tables ----------------------------------------------------------------------------------------
@@ -525,8 +546,14 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
     print(f"\n{few:,} lines: ns of processor time a sample, all of the command and its cutting alone;")
     print("cells looked at for each lowered; cells lowered a second, and as a share of np.minimum's")
     print(f"  {'':<8}{'command, ns':>16}{'cutting, ns':>14}{'looked at':>12}{'millions/s':>14}{'share':>14}")
+    words = []
     for name, make in (("ball", make_raster), ("flat", make_flat_raster)):
-        print_cells(make(folder, few), name, folder)
+        small = make(folder, few)
+        ours = print_cells(small, name, folder)
+        if ours is not None and "freecad" in arguments.peers:
+            words.append(freecad_line(small, name, ours, folder))
+    for word in dict.fromkeys(words):
+        print(f"  {word}")
 
 
 def kind_work(kind: Kind, arguments: argparse.Namespace, folder: Path) -> tuple[list[Work], list[str]]:
@@ -621,7 +648,7 @@ def options() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--lines", type=int, default=1_000_000)
-    parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all four")
+    parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all five")
     parser.add_argument("--repeats", type=int, default=3, help="rounds (default: 3)")
     parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
     parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")

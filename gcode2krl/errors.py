@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gcode2krl.codes import all_codes, follows
+from gcode2krl.codes import code_of, follows
 
 Severity = Literal["error", "warning", "note"]
 MOST_LINES = 20
@@ -64,7 +64,7 @@ class Issue:
         >>> Issue("error", "spindle-off", 6, "feed move with the spindle off").advice()
         'program S and M3 before the cut; M6 stops the spindle'
         """
-        entry = None if self.remedy else all_codes().get(self.code)
+        entry = None if self.remedy else code_of(self.code)
         if entry is None:
             return self.remedy
         first, _, others = entry.remedy.rstrip(".").partition(" ")

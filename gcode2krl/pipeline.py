@@ -14,7 +14,6 @@ from gcode2krl.blockwise import plan_course
 from gcode2krl.cell import Cell
 from gcode2krl.chain import Plan, collect, prepare
 from gcode2krl.errors import Issue
-from gcode2krl.identify import trial_program
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen
 from gcode2krl.tables import Joints, Motion, Targets, Toolpath
@@ -123,6 +122,8 @@ def controller_test_targets(
 
     Raises what `krc4.trial_program.controller_test_program` raises.
     """
+    from gcode2krl.identify import trial_program
+
     text = trial_program.controller_test_program(cell, origin_mm).encode("ascii")
     toolpath = gcode.read_stream(io.BytesIO(text), "test program", cell)
     targets = set_targets(toolpath, cell)

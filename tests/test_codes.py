@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl.codes import all_codes, closest, follows
+from gcode2krl.codes import all_codes, closest, code_of, follows
 from gcode2krl.gcode.findings import all_findings
 from gcode2krl.krl.release import NEVER_RELEASED, STRICTER_HERE
 
@@ -121,6 +121,11 @@ def _stated_severities() -> Iterator[tuple[str, str, str]]:
 
 
 @pytest.mark.slow
+def test_an_entry_read_alone_is_that_of_the_whole_table() -> None:
+    assert {name: code_of(name) for name in all_codes()} == all_codes()
+    assert code_of("no-such-code") is None
+
+
 def test_every_code_of_the_source_is_in_the_table() -> None:
     used = _used()
     assert len(used) > 200

@@ -69,6 +69,7 @@ def _number(key: str) -> int:
     return int(key.split(".")[1])
 
 
+@lru_cache(maxsize=4096)
 def general(key: str) -> str:
     """Return a dotted key with ``*`` for the number of a tool and the names of offsets and joints."""
     key = re.sub(r"^tool\.\d+\.", "tool.*.", key)

@@ -6,6 +6,7 @@ The list is of what is allowed: an unknown statement is refused.
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
 
 from gcode2krl import krl_words as w
 
@@ -78,7 +79,9 @@ def calls(text: str) -> list[str]:
     return [name for statement in statements(text) for name in _called(statement) if name not in _FUNCTIONS]
 
 
+@lru_cache(maxsize=4096)
 def _statement(line: str) -> str:
+    # the templates of a cell are rendered dozens of times, mostly to the same lines
     bare = re.sub(r'^((?:[^";]|"[^"]*")*);.*$', r"\1", line)
     return re.sub(r"\s+", " ", bare).strip().upper()
 

@@ -1,6 +1,5 @@
 """Entry point ``gcode2krl``: the commands, the default command, and how errors leave the program."""
 
-import gc
 import os
 import sys
 from pathlib import Path
@@ -46,8 +45,6 @@ _COMMANDS = {
     "completion": "Print the script that completes commands, options and files in a shell.",
     "explain": "Explain a finding by its code, as printed: spindle-off or spindle-off:12.",
 }
-_OBJECTS_BEFORE_A_SEARCH = 50_000
-"""Objects, most of which are kept, that are made before Python looks for cycles among them."""
 _OWN_OPTIONS = ("-h", "--help", "--version")
 
 
@@ -113,7 +110,6 @@ def commands() -> None:
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave with the exit code: 0 done, 1 refused, 2 not understood."""
     reserve_standard_files()
-    gc.set_threshold(_OBJECTS_BEFORE_A_SEARCH)
     for variable in MATRIX_VARIABLES:  # matrices are small: threads that wait took half of a diagnosis
         os.environ.setdefault(variable, "1")
     if "_GCODE2KRL_COMPLETE" in os.environ:

@@ -9,7 +9,6 @@ import re
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree import ElementTree
 
 KINDS = ("stl", "ply", "3mf")
 REMEDY = "export a closed solid as STL, PLY or 3MF in mm"
@@ -177,6 +176,8 @@ def _check_3mf(data: bytes) -> None:
 
 def _read_structure(text: bytes, solids: dict[str, _Solid], placed: list[str]) -> None:
     """Add the objects of a model, and those that it places."""
+    from xml.etree import ElementTree
+
     if b"\x00" in text or _XML_TRICKS.search(text):
         raise MeshError("its XML is not plain UTF-8 without declarations")
     solid = _Solid()

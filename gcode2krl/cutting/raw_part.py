@@ -1,7 +1,6 @@
 """The raw part as a height field: a block by numbers, a mesh, or a guess from the program (see `guess`)."""
 
 import io
-import logging
 import math
 import warnings
 from collections.abc import Iterator
@@ -124,6 +123,8 @@ def _solid_of(data: bytes, kind: str) -> "trimesh.Trimesh":
     It is read from bytes, so that it cannot refer to other files, and the reader's own warnings are
     suppressed.
     """
+    import logging
+
     import trimesh
 
     logging.getLogger("trimesh").addHandler(logging.NullHandler())

@@ -5,6 +5,7 @@ Findings about a stated raw part are errors, about a guessed one warnings.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -188,13 +189,21 @@ class Footprint:
     """Tells whether a cutter is over marked cells of a field, from sums over rectangles."""
 
     def __init__(self, field: HeightField, mask: Bools) -> None:
-        self.field = field
-        self.sums = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), dtype=np.int32)
-        np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=self.sums[1:, 1:])
+        self.field, self.mask = field, mask
+
+    @cached_property
+    def sums(self) -> Ints32:
+        """Return the marked cells before each row and column; few programs go deep enough to need them."""
+        rows, columns = self.mask.shape
+        sums = np.zeros((rows + 1, columns + 1), dtype=np.int32)
+        np.cumsum(np.cumsum(self.mask, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
+        return sums
 
     def below(self, position_mm: Floats, radius_mm: float) -> Bools:
         """Return (n,) True where marked cells lie within the radius of a position (n, 3), seen from above."""
         is_over = np.zeros(len(position_mm), dtype=np.bool_)
+        if not len(position_mm):
+            return is_over
         for angle in _CHORDS_RAD:
             half = radius_mm * np.array([np.cos(angle), np.sin(angle)])
             (j0, j1), (i0, i1) = (self._cells(position_mm[:, k], half[k], k) for k in (0, 1))

@@ -21,7 +21,7 @@ def _known(dialect: str) -> str:
 class Options(BaseModel):
     """Options of `translate`, `predict` and `batch`; a command takes those that it has."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, alias_generator=key_of)
+    model_config = ConfigDict(extra="forbid", strict=True, alias_generator=key_of, defer_build=True)
 
     cell: str | None = Field(None, description="Cell file.")
     job: str | None = Field(
