@@ -94,8 +94,8 @@ def describe(cause: CauseResult, most: int | None = None) -> str:
     Components of a vector stand in brackets; where there are more than ``most`` numbers none is given.
     """
     if cause.effect == "geometry":
-        numbers = f"{len(cause.parameters)} small numbers" if cause.parameters else "no number by itself"
-        return f"the arm's own geometry, {numbers}"
+        count = f"{len(cause.parameters)} small numbers" if cause.parameters else "no number by itself"
+        return f"the arm's own geometry, {count}"
     moment = cause.moment
     numbers = _numbers({k: v for k, v in cause.parameters.items() if moment is None or k != "at_s"})
     if moment is not None:
