@@ -101,7 +101,9 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     messages = {code: [m for c, m in first.errors if c == code] for code in codes}
     if "g43-missing" in codes:
         yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
-    if "spindle-off" in codes:
+    if any("it was stopped by" in message for message in messages.get("spindle-off", ())):
+        yield "spindle-off", "", ("--allow", "spindle-off")
+    elif "spindle-off" in codes:
         yield "spindle-off", "[program.start]\nspindle_rpm = 10000.0\n", ()
     if codes & {"undefined-position", "offset-from-unknown"}:
         yield "undefined-position", "[program.start]\nposition_mm = [0.0, 0.0, 50.0]\n", ()
@@ -160,12 +162,6 @@ def mended(text: bytes, first: Attempt) -> tuple[bytes, tuple[str, ...]]:
         if code in codes and remedy in first.printed:
             text = re.sub(pattern, by, text, count=int(code == "no-feed"), flags=re.MULTILINE | re.IGNORECASE)
             done.append(code)
-    stopped = [int(n) for n in re.findall(r":(\d+): error: feed move with the spindle off", first.printed)]
-    if stopped and "it was stopped by" in first.printed:
-        lines = text.split(b"\n")
-        for number in sorted(stopped, reverse=True):
-            lines.insert(number - 1, b"S10000 M3")
-        text = b"\n".join(lines)
     return text, tuple(done)
 
 

@@ -61,8 +61,8 @@ class Issue:
         """Return the remedy of the finding, or else that of its code in the table.
 
         >>> from gcode2krl import Issue
-        >>> Issue("error", "spindle-off", 6, "feed move with the spindle off").advice()
-        'program S and M3 before the cut; M6 stops the spindle'
+        >>> Issue("error", "dwell-negative", 6, "a dwell of -1 s").advice()
+        'give zero or more seconds'
         """
         entry = None if self.remedy else code_of(self.code)
         if entry is None:

@@ -276,7 +276,7 @@ class Prediction:
     forces: Forces | None = None
     deflection: Deflection | None = None
     skipped: tuple[Issue, ...] = ()
-    """Why a stage did not run."""
+    """Why a stage did not run, or what an effect did not know."""
     added: dict[str, Floats] = field(default_factory=dict)
     """Columns (m,) beside Motion that effects bring: ``q1_act_rad`` …, ``q1_load_rad`` …,
     ``force_meas_x_N`` …."""

@@ -367,11 +367,11 @@ def _speeds(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
 
 
 def _length_offsets(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
-    offset = toolpath.length_offset_tool
+    selected = toolpath.length_offset_tool
     touched_off = np.arange(len(toolpath)) <= _first_change(toolpath)  # with the mounted tool
-    other = feed & (toolpath.tool > 0) & (offset != toolpath.tool) & ~(touched_off & (offset < 0))
+    other = feed & (toolpath.tool > 0) & (selected != toolpath.tool) & ~(touched_off & (selected < 0))
     for row in _stretches(other):
-        number, offset = int(toolpath.tool[row]), int(toolpath.length_offset_tool[row])
+        number, offset = int(toolpath.tool[row]), int(selected[row])
         tool = cell.tool.get(number)
         if tool is None or (offset < 0 and not tool.length_mm):
             continue
