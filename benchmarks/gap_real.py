@@ -225,7 +225,7 @@ def cobot_rows(file: Path) -> Iterator["Row"]:
     if late is None:
         yield Row(f"cobot, {len(read)} movements", expected, f"{gap.verdict}: {_names(gap)}", False)
         return
-    value, least, most = (1e3 * each for each in late.parameters["dead_time_s"])
+    value, least, most = (1e3 * each for each in late.parameters["delay_s"])
     words = f"{value:.2f} ms [{least:.2f}, {most:.2f}], p {late.probability:.2f}; {_shrunk(gap)}"
     yield Row(f"cobot, {len(read)} movements", expected, words, low <= value <= high)
 

@@ -170,14 +170,14 @@ def _check_radians(table: Controller) -> None:
             raise _error("trace-unit", words, remedy, table, 0)
 
 
-def _check_clocks(first: Measured, other: Measured) -> None:
-    spans = [float(np.ptp(table.time_s)) for table in (first, other)]
+def _check_clocks(table: Measured, other: Measured) -> None:
+    spans = [float(np.ptp(each.time_s)) for each in (table, other)]
     first, last = (
-        max(first.time_s[0], other.time_s[0]),
-        min(first.time_s[-1], other.time_s[-1]),
+        max(table.time_s[0], other.time_s[0]),
+        min(table.time_s[-1], other.time_s[-1]),
     )
-    file = Path(first.source).name
-    long, short = (first, other) if spans[0] > spans[1] else (other, first)
+    file = Path(table.source).name
+    long, short = (table, other) if spans[0] > spans[1] else (other, table)
     slow = float(np.median(np.diff(long.time_s))) > _LONGEST_FAST_CYCLE_S
     if slow and _SCALED[0] < max(spans) / min(spans) < _SCALED[1]:
         words = (
@@ -188,7 +188,7 @@ def _check_clocks(first: Measured, other: Measured) -> None:
     if first >= last:
         words = (
             f"column {TIME} runs from {other.time_s[0]:.4g} to {other.time_s[-1]:.4g} s, that of {file} from "
-            f"{first.time_s[0]:.4g} to {first.time_s[-1]:.4g} s: they do not overlap"
+            f"{table.time_s[0]:.4g} to {table.time_s[-1]:.4g} s: they do not overlap"
         )
         raise _error("trace-overlap", words, "export one run; [clocks] in run.toml shifts a clock", other, 0)
 
