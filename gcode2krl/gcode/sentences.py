@@ -87,7 +87,10 @@ def _texts(finding: FindingKind, a: float, b: float) -> tuple[str, str]:
     if finding.name == "F.BAD_CHARACTER" and 0 < a < FIRST_FOREIGN:
         return finding.sentence, _OF_CHARACTER.get(chr(int(a)), finding.remedy)
     if finding.name == "F.NO_MOTION_MODE" and not a:
-        return finding.sentence, f"{finding.remedy}, or state the control's first one as motion in [program.start] of the cell"
+        return (
+            finding.sentence,
+            f"{finding.remedy}, or state the control's first one as motion in [program.start] of the cell",
+        )
     return finding.sentence, finding.remedy
 
 
