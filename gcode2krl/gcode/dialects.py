@@ -56,7 +56,7 @@ REASONS: Final = (
     ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
     ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
     (
-        "variables, jumps and subprograms are read in the dialects linuxcnc and fanuc alone",
+        "variables, jumps and subprograms of LinuxCNC are not read in this dialect",
         "let the post write the program out in plain numbers",
     ),
     (
