@@ -1,14 +1,12 @@
 """Programs for industrial controls, read twice: by the package, and by ``tests/reference/controls.py``.
 
 ``python benchmarks/controls_twice.py FOLDER [FOLDER …]`` takes every file below the folders that has the
-marks of a
-Fanuc, a Sinumerik or a Heidenhain, reads it in that dialect for a cell that knows the tools T1 to T99,
-follows one
-remedy where it is refused (a key of the cell; a second one where a Sinumerik's program has no F), and compares the places with the other reading within 1e-6 mm. Subprograms of a
-Sinumerik are looked for beside a program and in the other folders with such files. Printed is for each
-file: read, after one remedy, or not and why; and for those that are read: same, another place, or why they
-are
-not compared. The exit code is 1 where a place differs.
+marks of a Fanuc, a Sinumerik or a Heidenhain, reads it in that dialect for a cell that knows the tools T1 to
+T99, follows one remedy where it is refused (a key of the cell; then F, where a Sinumerik's program has none),
+and compares the places with the other reading within 1e-6 mm. Subprograms of a Sinumerik are looked for
+beside a program and in the other folders with such files. Printed is for each file: read, after remedies, or
+not and why; and for those that are read: same, another place, or why they are not compared. The exit code is
+1 where a place differs.
 """
 
 import io
@@ -36,7 +34,7 @@ _OTHER_DIALECT = {"fanuc": "fanuc-calculator"}
 
 
 def remedied(path, dialect):
-    """Return a cell that states what refusals ask for: the cutter, the start, and the names of the program's tools."""
+    """Return a cell that states what refusals ask for: the cutter, the start, the names of tools."""
     names = dict.fromkeys(name for pair in _NAMED_TOOL.findall(text_of(path)) for name in pair if name)
     tools = {n: {**_TOOLS[n], "name": name} for n, name in zip(range(99, 0, -1), names, strict=False)}
     return over_demonstration({"tool": {**_TOOLS, **tools}, **_STATED.get(dialect, {})})
@@ -53,7 +51,11 @@ def reading(path, dialect, search):
             if not feed:
                 return how, read_gcode(path, cell, dialect=spoken, search=search), ""
             stream = io.BytesIO(feed + path.read_bytes())
-            return how, read_stream(stream, str(path), cell, dialect=spoken, folders=[path.parent, *search]), ""
+            return (
+                how,
+                read_stream(stream, str(path), cell, dialect=spoken, folders=[path.parent, *search]),
+                "",
+            )
         except Gcode2KrlError as error:
             first = next(issue for issue in error.issues if issue.severity == "error")
             why = f"line {first.line}: {first.message} [{first.code}]"
@@ -86,7 +88,11 @@ def text_of(path):
 def compared(path, dialect, toolpath, search):
     """Return what comparing a reading with the other one says."""
     near = {p.stem.upper(): text_of(p) for folder in search for p in folder.glob("*.[sS][pP][fF]")}
-    beside = {"fanuc": {}, "sinumerik": {"programs": near, "radius": _RADIUS_MM}, "heidenhain": {"radius": _RADIUS_MM}}
+    beside = {
+        "fanuc": {},
+        "sinumerik": {"programs": near, "radius": _RADIUS_MM},
+        "heidenhain": {"radius": _RADIUS_MM},
+    }
     try:
         theirs = controls.READERS[dialect](text_of(path), **beside[dialect])
     except controls.Unknown as unknown:

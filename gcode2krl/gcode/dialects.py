@@ -56,7 +56,7 @@ REASONS: Final = (
     ("a code that says nothing to a robot shares its block with axis words", "give it a block of its own"),
     ("a cutting edge beyond the first", "the cell's tool has one length: use D1"),
     (
-        "variables, jumps and subprograms are read in the dialects linuxcnc and fanuc alone",
+        "variables, jumps and subprograms of LinuxCNC are not read in this dialect",
         "let the post write the program out in plain numbers",
     ),
     (
@@ -66,8 +66,8 @@ REASONS: Final = (
     ("it converts lengths to inches, but not feeds", "let the post write G700, or mm with G710"),
     (
         "how this control leads in and out, and what D holds, are parameters of the control",
-        'state lead_in = "a", "b", "c-a" or "c-b" and d = "radius", "diameter" or "wear" in [program.cutter] of'
-        " the cell,"
+        'state lead_in = "a", "b", "c-a" or "c-b" and d = "radius", "diameter" or "wear" in [program.cutter]'
+        " of the cell,"
         " or let the post write the path of the tool's centre",
     ),
     (
@@ -235,13 +235,13 @@ REASONS: Final = (
         "write G450 before the contour",
     ),
     (
-        "G41, G42 and G40 in a block without a move shift the tool at once (type C), and what they then do beside a move"
-        " along the tool, an arc, or with another block before the contour is not sure",
+        "G41, G42 and G40 in a block without a move shift the tool at once (type C), and what they then do"
+        " beside a move along the tool, an arc, or with another block before the contour is not sure",
         "write G41 and G42 in the block before the contour, and G40 right behind it",
     ),
     (
-        "HOLES1, HOLES2 and CYCLE801 are read under MCALL with a cycle, in G17 and G90, from where X and Y are known: the"
-        " arguments that place the holes alone, at most 10000 holes, in less than a turn",
+        "HOLES1, HOLES2 and CYCLE801 are read under MCALL with a cycle, in G17 and G90, from where X and Y"
+        " are known: the arguments that place the holes alone, at most 10000 holes, in less than a turn",
         "write MCALL CYCLE81(…) before it, or let the post write X and Y of each hole",
     ),
 )
@@ -343,7 +343,7 @@ class Dialect:
     variables: Mapping[str, int] = field(default_factory=dict)
     """Numbers, as parameters, of the variables that the program defines, by their names in capitals."""
     arrays: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
-    """Of its arrays the number of the first element, and the sizes, 0 for none, by their names in capitals."""
+    """Of its arrays the number of the first element and the sizes, 0 for none, by their names in capitals."""
 
     def syntax_bits(self) -> int:
         """Return the bits of what of its text is no plain word."""
@@ -499,7 +499,23 @@ _SINUMERIK_STATEMENTS = {
     _kind(d.REFUSED, _SCALED): ("SCALE", "ASCALE"),
     _kind(d.REFUSED, _POLAR): ("AP", "RP", "TRANSMIT", "TRACYL"),
     _kind(d.REFUSED, _CYCLE): (
-        *("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72"),
+        *(
+            "POCKET1",
+            "POCKET2",
+            "POCKET3",
+            "POCKET4",
+            "SLOT1",
+            "SLOT2",
+            "LONGHOLE",
+            "CYCLE60",
+            "CYCLE61",
+            "CYCLE62",
+            "CYCLE63",
+            "CYCLE64",
+            "CYCLE70",
+            "CYCLE71",
+            "CYCLE72",
+        ),
         *("CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79"),
         *("CYCLE87", "CYCLE88", "CYCLE802"),
     ),

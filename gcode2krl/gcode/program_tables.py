@@ -141,7 +141,7 @@ LABEL = np.dtype(
 )
 """N and its number, for GOTO, sorted by segment, number, word; or a number of CASE in its line's segment."""
 ARRAY = np.dtype([("first", "i8"), ("rows", "i8"), ("columns", "i8")])
-"""An array of a Sinumerik: the parameter of its first element, and its sizes; columns 0 = it has one alone."""
+"""An array of a Sinumerik: the parameter of its first element, and its sizes; columns 0 = it has one."""
 COURSE = np.dtype(
     [
         ("steps", "i8"),  # lines executed

@@ -90,7 +90,10 @@ def _texts(finding: FindingKind, a: float, b: float) -> tuple[str, str]:
     if finding.name == "F.UNKNOWN_G" and a == _SCALING_OFF:
         return finding.sentence, _REMOVE_G50
     if finding.name == "F.NO_MOTION_MODE" and not a:
-        return finding.sentence, f"{finding.remedy}, or state the control's first one as motion in [program.start] of the cell"
+        return (
+            finding.sentence,
+            f"{finding.remedy}, or state the control's first one as motion in [program.start] of the cell",
+        )
     return finding.sentence, finding.remedy
 
 

@@ -79,8 +79,8 @@ _DEFINED = re.compile(
     _FLAGS & ~re.DOTALL | re.MULTILINE,
 )
 _VARIABLE = re.compile(
-    rb"[ \t]*(?P<name>[A-Z_]{2}[A-Z0-9_]*)(?:\[[ \t]*(?P<rows>\d{1,4})[ \t]*(?:,[ \t]*(?P<columns>\d{1,4})[ \t]*)?\])?"
-    rb"[ \t]*(?:=|\Z)",
+    rb"[ \t]*(?P<name>[A-Z_]{2}[A-Z0-9_]*)"
+    rb"(?:\[[ \t]*(?P<rows>\d{1,4})[ \t]*(?:,[ \t]*(?P<columns>\d{1,4})[ \t]*)?\])?[ \t]*(?:=|\Z)",
     re.IGNORECASE,
 )
 _BETWEEN_COMMAS = re.compile(rb"(?:[^,(\[]|\((?:[^()]|\([^()]*\))*\)|\[[^\]]*\])+")
@@ -114,15 +114,18 @@ _WITH_EXPRESSION = ("if", "while", "for", "until")
 def variables_of(
     text: bytes, taken: Mapping[str, int], taken_arrays: Mapping[str, Array]
 ) -> tuple[dict[str, int], dict[str, Array]]:
-    """Return the numbers, as parameters, of the variables that a file defines, and its arrays, by names in capitals.
+    """Return the numbers, as parameters, of the variables that a file defines, and its arrays, by names.
 
-    ``taken`` and ``taken_arrays`` are those of the files before.
+    Names are in capitals. ``taken`` and ``taken_arrays`` are those of the files before.
     """
     numbers: dict[str, int] = {}
     arrays: dict[str, Array] = {}
-    ends = [n + 1 for n in taken.values()] + [first + _size(*sizes) for first, *sizes in taken_arrays.values()]
+    ends = [n + 1 for n in taken.values()] + [
+        first + _size(*sizes) for first, *sizes in taken_arrays.values()
+    ]
     free = {
-        of_type: max((n for n in ends if first < n <= end), default=first) for of_type, (first, end) in _ROOM.items()
+        of_type: max((n for n in ends if first < n <= end), default=first)
+        for of_type, (first, end) in _ROOM.items()
     }
     for of_type, name, rows, columns in _names_defined(text):
         size = _size(rows, columns)
@@ -141,7 +144,7 @@ def _size(rows: int, columns: int) -> int:
 
 
 def _names_defined(text: bytes) -> Iterator[tuple[bytes, str, int, int]]:
-    """Yield type and name of each variable that PROC and DEF define, and its sizes as an array, 0 for none."""
+    """Yield type and name of each variable that PROC and DEF define, and its sizes, 0 for none."""
     heading = _HEADING.match(text)
     for part in (heading["formals"] or b"").split(b",") if heading is not None else ():
         formal = _FORMAL.match(part)

@@ -43,12 +43,27 @@ static int64_t after_arguments(Bytes text, int64_t i) {
     return i;
 }
 
-/* Tell whether nothing of a value follows a number that ends at i: no operator, no name, no bracket. */
+/* Tell whether DIV or MOD stands at i. */
+static bool is_operator(Bytes text, int64_t i) {
+    static const char *const NAME[] = {"DIV", "MOD"};
+    for (size_t k = 0; k < sizeof NAME / sizeof *NAME; k++) {
+        int n = 0;
+        while (i + n < text.rows && NAME[k][n] != 0 && (AT(text, i + n) & ~CH_CASE_BIT) == NAME[k][n])
+            n++;
+        if (NAME[k][n] == 0 && !(i + n < text.rows && is_of_name(AT(text, i + n))))
+            return true;
+    }
+    return false;
+}
+
+/* Tell whether nothing of a value follows a number that ends at i: no operator, no bracket. */
 static bool ends_value(Bytes text, int64_t i) {
     i = behind_blanks(text, i);
     if (i >= text.rows)
         return true;
     const uint8_t c = AT(text, i);
+    if (is_operator(text, i))
+        return false;
     return c == '\n' || c == ';' || c == ')' || c == '(' || is_letter(c);
 }
 

@@ -51,12 +51,14 @@ PROGRAMS = [
     ),
     (
         "sinumerik",
-        "MCALL CYCLE81(10,0,2,-5,0)\nHOLES1(20,10,30,5,12,4)\nHOLES1(20,10,30,5,12,4)\nHOLES2(50,60,20,15,0,5)\n"
-        "HOLES2(50,60,20,15,-30,3)\nCYCLE801(100,-20,20,15,10,3,4)\nCYCLE801(100,-20,20,10,15,3,4)\nMCALL\nG0 X1\nM30",
+        "MCALL CYCLE81(10,0,2,-5,0)\nHOLES1(20,10,30,5,12,4)\nHOLES1(20,10,30,5,12,4)\n"
+        "HOLES2(50,60,20,15,0,5)\nHOLES2(50,60,20,15,-30,3)\nCYCLE801(100,-20,20,15,10,3,4)\nCYCLE801(100,-20,20,10,15,3,4)\nMCALL\n"
+        "G0 X1\nM30",
     ),
     (
         "sinumerik",
-        "TRANS X5 Y7\nMCALL CYCLE82(10,0,2,-5,0,0.5)\nX200 Y100\nCYCLE801(10,20,0,15,10,2,3)\nHOLES1(0,0,180,5,12,3)\nMCALL\nM30",
+        "TRANS X5 Y7\nMCALL CYCLE82(10,0,2,-5,0,0.5)\nX200 Y100\nCYCLE801(10,20,0,15,10,2,3)\n"
+        "HOLES1(0,0,180,5,12,3)\nMCALL\nM30",
     ),
     (
         "sinumerik",

@@ -69,7 +69,7 @@ def test_type_b_goes_around_the_corner():
 
 @pytest.mark.parametrize(("lead_in", "corner"), [("c-a", []), ("c-b", [[20, -5], [25, -5]])])
 def test_type_c_shifts_the_tool_by_itself_where_its_block_has_no_move(lead_in, corner):
-    """At right angles to the next and the last block, with the motion code of G41 and G40; else as type A or B."""
+    """At right angles to the next and the last block, by the motion code of G41 and G40; else as A or B."""
     alone = read("G42 D1\nG1 X20.\nY20.\nG40\nZ9.", lead_in)
     expected = [[0, -5, 5], [20, -5, 5], [25, -5, 5], [25, 20, 5], [20, 20, 5], [20, 20, 9]]
     np.testing.assert_allclose(alone.position_mm[2:], expected, atol=1e-9)

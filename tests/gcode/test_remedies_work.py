@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from gcode2krl import Gcode2KrlError
+from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.gcode.findings import all_findings
 from gcode2krl.gcode.read import read_stream
 from tests.cells import over_demonstration
@@ -90,6 +91,7 @@ BEFORE = {
     "linuxcnc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
     "fanuc": "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0. Y0. Z0.\nF500\n",
     "heidenhain": "0 BEGIN PGM P MM\n1 TOOL CALL 1 Z S8000 F500\n2 L X+0 Y+0 Z+0 R0 FMAX M3\n",
+    "grbl": "",
     "sinumerik": "G710 G90 G17 G94\nG54\nT1 M6\nD1\nS8000 M3\nG0 X0 Y0 Z0\nF500\n",
 }
 
@@ -131,3 +133,10 @@ def test_who_follows_the_remedy_of_a_reason_gets_the_program_it_promises(name):
 def test_every_finding_of_the_reader_has_its_remedy_carried_out():
     told = REMEDIES["code"].keys() | REMEDIES["elsewhere"].keys()
     assert {finding.code for finding in all_findings().values()} == told
+
+
+def test_every_reason_has_its_remedy_carried_out():
+    entries = [*REMEDIES["reason"].values(), *REMEDIES["code"].values()]
+    refused = [outcome(entry, entry["refused"], entry.get("of"))[0] for entry in entries]
+    told = {issue.message for issues in refused for issue in issues}
+    assert not [reason for reason, _ in REASONS if not any(reason in message for message in told)]

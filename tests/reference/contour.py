@@ -1,13 +1,14 @@
-"""The path of a tool's centre beside a contour, once more: in complex numbers, from the figures of the manuals.
+"""The path of a tool's centre beside a contour, once more: in complex numbers, from the manuals' figures.
 
-Nothing of the package is used. An element is (start, end, centre, turn), a line where turn is 0, an arc counterclockwise
-where it is 1; a corner behind it is (kind, value) with RND, CHR or CHF. `tool_path` rounds corners first, then moves every
-element aside by the radius and looks for where neighbours meet: inside of a corner it takes, of all common points, the one
-nearest to the programmed corner.
+Nothing of the package is used. An element is (start, end, centre, turn), a line where turn is 0, an arc
+counterclockwise where it is 1; a corner behind it is (kind, value) with RND, CHR or CHF. `tool_path` rounds
+corners first, then moves every element aside by the radius and looks for where neighbours meet: inside of a
+corner it takes, of all common points, the one nearest to the programmed corner.
 """
 
 import cmath
 import math
+from itertools import pairwise
 
 SMOOTH_RAD, MEETING_DEG, NEAR_MM = 1e-6, 100.0, 1e-9
 
@@ -36,7 +37,7 @@ def bend(before, after):
 
 
 def rounded(elements, corners):
-    """Return elements with the corners behind them made: ``corners`` has one entry an element, None for none."""
+    """Return elements with the corners behind them made: ``corners`` has one an element, None for none."""
     found, begin = [], None
     for k, element in enumerate(elements):
         start, end, centre, turn = element
@@ -81,7 +82,11 @@ def _common(one, other, side, radius):
         between, apart = q - p, abs(q - p)
         along = (apart**2 + a**2 - c**2) / (2 * apart) if apart else math.inf
         square = a**2 - along**2
-        return [p + between / apart * (along + s * 1j * math.sqrt(square)) for s in (1, -1)] if square >= 0 else []
+        return (
+            [p + between / apart * (along + s * 1j * math.sqrt(square)) for s in (1, -1)]
+            if square >= 0
+            else []
+        )
     (at, way), (middle, size) = ((p, a), (q, c)) if one[3] == 0 else ((q, c), (p, a))
     foot = at + way * ((middle - at) * way.conjugate()).real
     square = size**2 - abs(foot - middle) ** 2
@@ -119,12 +124,12 @@ def _square(left, a, reached, c, radius):
 def tool_path(elements, side, radius, corners="arc", roundings=None):
     """Return the tool's centre beside a contour: its start, and what follows up to its end; of arcs the ends.
 
-    ``elements`` are those of the contour without what leads in and out; ``corners`` is ``"arc"`` (G450), ``"meeting"`` (G451)
-    or ``"square"`` (Fanuc).
+    ``elements`` are those of the contour without what leads in and out; ``corners`` is ``"arc"`` (G450),
+    ``"meeting"`` (G451) or ``"square"`` (Fanuc).
     """
     made = rounded(elements, roundings or [None] * len(elements))
     places = [made[0][0] + side * radius * 1j * direction(made[0], at_end=False)]
-    for one, other in zip(made, made[1:], strict=False):
+    for one, other in pairwise(made):
         places += _around(one, other, side, radius, corners)
     places.append(made[-1][1] + side * radius * 1j * direction(made[-1], at_end=True))
     return places

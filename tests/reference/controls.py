@@ -2,9 +2,10 @@
 plain Python.
 
 Nothing of the package is used. Only places are worked out: of moves, arcs' ends, drilled holes, subprograms,
-jumps and loops, in G17, without rotary axes; beside a compensated contour, at one height, by `contour`. `columns`
-makes of places what two readings can be compared by: at each X and Y the lowest, highest and last Z, as the
-strokes of a hole differ by parameters. What this does not know raises `Unknown`, and the program is not compared.
+jumps and loops, in G17, without rotary axes; beside a compensated contour, at one height, by `contour`.
+`columns` makes of places what two readings can be compared by: at each X and Y the lowest, highest and last
+Z, as the strokes of a hole differ by parameters. What this does not know raises `Unknown`, and the program is
+not compared.
 """
 
 import cmath
@@ -92,7 +93,11 @@ class _Machine:
         before = dict(self.at)
         here = None if None in (before["X"], before["Y"]) else complex(before["X"], before["Y"])
         after = {**before, **to}
-        across = here is not None and None not in (after["X"], after["Y"]) and here != complex(after["X"], after["Y"])
+        across = (
+            here is not None
+            and None not in (after["X"], after["Y"])
+            and here != complex(after["X"], after["Y"])
+        )
         if self.side and (across or turn) and not self.is_led:
             if turn or corner:
                 raise Unknown("an arc or a corner leads in")
@@ -247,7 +252,9 @@ def _code(text):
 def _value(text, variables):
     """Return the value of an expression of a Sinumerik or Heidenhain."""
     try:
-        return float(eval(_code(text), {"__builtins__": {}, **_SIEMENS, "R": _Parameters(variables)}, variables))
+        return float(
+            eval(_code(text), {"__builtins__": {}, **_SIEMENS, "R": _Parameters(variables)}, variables)
+        )
     except Exception as error:
         raise Unknown(text) from error
 
@@ -255,7 +262,9 @@ def _value(text, variables):
 _BRACKET = r"\([^()]*\)"
 for _ in range(3):  # brackets within brackets
     _BRACKET = rf"\((?:[^()]|{_BRACKET})*\)"
-_ADDRESS = re.compile(rf"([A-Z_]+\w*)=((?:[^\s();\[\]]|\[[^\]]*\]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
+_ADDRESS = re.compile(
+    rf"([A-Z_]+\w*)=((?:[^\s();\[\]]|\[[^\]]*\]|{_BRACKET})+)|([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))"
+)
 _SAID = (
     r"\b(?:MSG\s*\([^)]*\)|COMPCAD|COMPOF|FFWON|FFWOF|SOFT|BRISK|STOPRE|F?NORM|CYCLE832\s*\([^)]*\)|TRAFOOF|CYCLE800\(\)|SETMS\(\d\)"
     r"|G64[0-9]*|ADIS\s*=\S+)"
@@ -272,7 +281,9 @@ class _Array:
     def place(self, index):
         """Return the place of an element."""
         index = index if isinstance(index, tuple) else (index,)
-        if len(index) != len(self.sizes) or any(i != int(i) or not 0 <= i < n for i, n in zip(index, self.sizes, strict=True)):
+        if len(index) != len(self.sizes) or any(
+            i != int(i) or not 0 <= i < n for i, n in zip(index, self.sizes, strict=True)
+        ):
             raise Unknown("index")
         return int(index[0]) if len(index) == 1 else int(index[0]) * self.sizes[1] + int(index[1])
 
@@ -304,8 +315,10 @@ def _outside_brackets(text):
 
 
 def siemens(text, programs=None, radius=None):
-    """Return the places of a program for a Sinumerik 840D; ``programs`` are texts of subprograms by name, ``radius`` is
-    that of every tool."""
+    """Return the places of a program for a Sinumerik 840D.
+
+    ``programs`` are texts of subprograms by name, ``radius`` is that of every tool.
+    """
     run, variables = _Machine(radius), {f"R{n}": 0.0 for n in range(100)}
     _siemens_program(text, run, variables, {"g": 0, "modal": None}, programs or {}, 0)
     return run.places
@@ -440,7 +453,12 @@ def _siemens_block(line, run, variables, state):
     modal = "MCALL" in line
     cycle = re.search(r"CYCLE(8[123])\s*\((.*)\)", line)
     if (pattern := re.match(r"(HOLES1|HOLES2|CYCLE801)\((.*)\)$", line)) is not None:
-        _siemens_pattern(pattern[1], [_value(part, variables) if part else 0.0 for part in pattern[2].split(",")], run, state)
+        _siemens_pattern(
+            pattern[1],
+            [_value(part, variables) if part else 0.0 for part in pattern[2].split(",")],
+            run,
+            state,
+        )
         return False
     if cycle or modal:
         hole = _siemens_hole(cycle, variables) if cycle else None
@@ -495,14 +513,16 @@ def _siemens_block(line, run, variables, state):
             run.at[axis] = None
     elif 4 not in gs and (to or (state["g"] > 1 and any(a in ("I", "J") for a, _ in words))):
         there = {axis: run.target(axis, *value) for axis, value in to.items()}
-        run.move(there, *_siemens_arc(run, there, words_of_arc, state["g"], variables), corner, state["g"] > 0)
+        run.move(
+            there, *_siemens_arc(run, there, words_of_arc, state["g"], variables), corner, state["g"] > 0
+        )
         if state["modal"]:
             run.hole(*state["modal"])
     return bool(ms & {2, 17, 30})
 
 
 def _siemens_arc(run, to, words, g, variables):
-    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out under G41 alone."""
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre under G41 alone."""
     if g < 2:
         return None, 0
     turn = 1 if g == 3 else -1
@@ -516,7 +536,10 @@ def _siemens_arc(run, to, words, g, variables):
             part = _value(value[2:] if absolute else value, variables) * run.unit
             parts.append(part + (run.shift[axis] if absolute else run.at[axis]))
         return complex(*parts), turn
-    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    here, there = (
+        complex(run.at["X"], run.at["Y"]),
+        complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"])),
+    )
     return _centre(here, there, _value(words["CR"], variables) * run.unit, turn), turn
 
 
@@ -663,7 +686,7 @@ def _heidenhain_block(code, run, q, state):
 
 
 def _heidenhain_arc(head, code, to, run, q, state):
-    """Return centre and turn of an arc, None and 0 for a straight move; the centre is worked out beside a contour alone."""
+    """Return centre and turn of an arc, None and 0 for a straight move; the centre beside a contour alone."""
     if head not in ("C", "CR", "CT"):
         return None, 0
     way = re.search(r"\bDR ?([+-])", code)
@@ -674,7 +697,10 @@ def _heidenhain_arc(head, code, to, run, q, state):
         return complex(state["pole"]["X"] + run.shift["X"], state["pole"]["Y"] + run.shift["Y"]), turn
     if head == "CT":
         raise Unknown("CT beside a contour")
-    here, there = complex(run.at["X"], run.at["Y"]), complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"]))
+    here, there = (
+        complex(run.at["X"], run.at["Y"]),
+        complex(to.get("X", run.at["X"]), to.get("Y", run.at["Y"])),
+    )
     radius = re.search(r"(?<!D)R ?([+-]?[\d.]+)", code)
     return _centre(here, there, _value(radius[1], q), turn), turn
 
