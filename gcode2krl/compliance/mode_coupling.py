@@ -9,11 +9,11 @@ at the gain g = 1. K is symmetric, Kp is not: two stiffnesses near each other ar
 oscillation (flutter), and a part of Kp that is larger than K pulls the tool in. Neither needs waves that the
 tooth before left on the surface, so it happens at the arm's own low frequency at any spindle speed.
 
-Sources, known from their abstracts: Pan, Zhang, Zhu & Wang 2006 (Chatter analysis of robotic machining process):
-K - Kp of an arm; Cen & Melkote 2017 (CCT-based mode coupling chatter avoidance in robotic milling): choice of
-the pose; Mousavi, Gagnol, Bouzgarrou & Ray 2018 (Stability optimization in robotic milling through the control
-of functional redundancies): choice of the turn about the tool axis. The equations here are derived from the
-balance of forces; `benchmarks/mode_coupling.py` holds them against a simulation in time.
+Sources, known from their abstracts: Pan, Zhang, Zhu & Wang 2006 (Chatter analysis of robotic machining
+process): K - Kp of an arm; Cen & Melkote 2017 (CCT-based mode coupling chatter avoidance in robotic milling):
+choice of the pose; Mousavi, Gagnol, Bouzgarrou & Ray 2018 (Stability optimization in robotic milling through
+the control of functional redundancies): choice of the turn about the tool axis. The equations here follow
+from the balance of forces; `benchmarks/mode_coupling.py` holds them against a simulation in time.
 
 Left out: regeneration (`cutting.lobes`), mass that differs with direction, damping other than `DAMPING`, the
 part of the force that follows the tip's velocity, the bending of spindle and tool themselves.
@@ -30,7 +30,7 @@ DAMPING = 0.02
 """Damping ratio of the arm's modes, an assumption: tap tests of milling robots find 0.01 to 0.05."""
 MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
-_GAINS = np.geomspace(1.0 / 16.0, MOST_GAIN, 25)
+_GAINS = np.geomspace(1.0 / 16.0, MOST_GAIN, 17)
 _HALVINGS = 7
 _LOAD_N = 1.0
 

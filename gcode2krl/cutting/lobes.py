@@ -6,7 +6,7 @@ Annals 44): the directional factors are averaged over the arc, and at a chatter 
     a = -(2·pi·L_R/(N·K_t))·(1 + (L_I/L_R)²),    L = -1/eigenvalue of [alpha]·[G(iw)]
 
 is on the border at the spindle speeds whose tooth period is (pi - 2·atan(L_I/L_R) + 2·pi·j)/w. Holds for arcs
-that are not short (low immersion has lobes of period doubling too), constant coefficients, no process damping.
+that are not short (low immersion has lobes of period doubling too), constant coefficients, no wear.
 """
 
 from collections.abc import Sequence

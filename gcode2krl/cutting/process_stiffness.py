@@ -2,11 +2,11 @@
 
 Only slow displacements count, far below tooth passing, of a tool that goes on along its feed:
 
-- along the axis the depth of cut changes, and the force with it: -F/a_p. Exact for a flat mill; of round edges,
-  whose force at first grows faster than the depth, it is the mean from nothing up to this depth;
-- normal to feed and axis an arc begins or ends elsewhere: where it does not end at the tangent of its own wall,
-  it ends at a plane face along the feed, which stays where it is. The force there is that of an edge at that
-  angle, taken as a cylinder's;
+- along the axis the depth of cut changes, and the force with it: -F/a_p. Exact for a flat mill; of round
+  edges, whose force is not proportional to the depth, it is the mean from nothing up to this depth;
+- normal to feed and axis an arc begins or ends elsewhere: where it does not end at the tangent of its own
+  wall, it ends at a plane face along the feed, which stays where it is. The force there is that of an edge at
+  that angle, taken as a cylinder's;
 - along the feed nothing changes.
 
 In a slot both ends are the tool's own walls, and only the depth counts. Derived from the linear edge law
@@ -41,9 +41,7 @@ def process_stiffness(forces: Forces, motion: Motion, toolpath: Toolpath, cell: 
         tool, move = cell.tool[int(number)], motion.move[rows]
         depth_mm = forces.a_p_mm[rows]
         axis = rotation_from_quaternion(np.ascontiguousarray(motion.rotation[rows]))[:, :, 2]
-        along = motion.direction[rows] - axis * np.einsum("ij,ij->i", motion.direction[rows], axis)[:, None]
-        size = np.linalg.norm(along, axis=1, keepdims=True)
-        feed = np.divide(along, size, out=np.zeros_like(along), where=size > 1e-9)
+        feed = across(motion.direction[rows], axis)
         normal = np.cross(axis, feed)
         f_z_mm = feed_per_tooth(motion.speed_mm_s[rows], toolpath.spindle_rad_s[move], tool.teeth)
         local = side_slope(forces.phi_rad[rows], depth_mm, f_z_mm, tool.teeth, tool.diameter_mm, law)
@@ -51,6 +49,13 @@ def process_stiffness(forces: Forces, motion: Motion, toolpath: Toolpath, cell: 
         deeper = -forces.force_base_N[rows] / depth_mm[:, None]
         result[rows] = sideways[:, :, None] * normal[:, None, :] + deeper[:, :, None] * axis[:, None, :]
     return result
+
+
+def across(direction: Floats, axis: Floats) -> Floats:
+    """Return the unit direction (n, 3) of a motion across unit axes (n, 3), zero where it is along them."""
+    part = direction - axis * np.einsum("ij,ij->i", direction, axis)[:, None]
+    size = np.linalg.norm(part, axis=1, keepdims=True)
+    return np.asarray(np.divide(part, size, out=np.zeros_like(part), where=size > 1e-9))
 
 
 def side_slope(

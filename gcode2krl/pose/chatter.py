@@ -16,16 +16,22 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compliance import missing_stiffness, stiffness
 from gcode2krl.compliance.mode_coupling import coupling_index, tip_stiffness
+from gcode2krl.cutting.force import cutting_load
+from gcode2krl.cutting.law import law_array
 from gcode2krl.cutting.lobes import depth_limit
-from gcode2krl.cutting.process_stiffness import process_stiffness
+from gcode2krl.cutting.process_stiffness import across, process_stiffness, side_slope
 from gcode2krl.errors import Issue
+from gcode2krl.frames import rotation_from_quaternion
+from gcode2krl.pose.quality import Poses
 from gcode2krl.tables import Forces, Motion, Toolpath, rows_at
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG, RAD_PER_REV, S_PER_MIN
 
-JUDGED = 200
+JUDGED = 400
 """Samples of a block, or of a prediction, that are judged, evenly among those that cut."""
 _DEEPEST = 6
 _GRID_RAD = 5.0 * RAD_PER_DEG
+_USUAL_CHIP_MM = 0.1
+_UP_HALF = np.array([[0.0, math.pi / 2.0]])
 
 
 class Coupling(NamedTuple):
@@ -53,7 +59,7 @@ def coupling_along(
     >>> from gcode2krl.pose.chatter import coupling_along
     >>> seen = Prediction.load("prediction")
     >>> along = coupling_along(seen.toolpath, seen.motion, seen.joints.q_rad, seen.forces, seen.cell)
-    >>> len(along.coupling) <= 200
+    >>> len(along.coupling) <= 400
     True
     """
     cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0) & np.isfinite(q_rad).all(axis=1)
@@ -89,6 +95,32 @@ def _turned(
     index = np.full(len(q_rad), np.nan)
     if reached.any():
         index[reached] = coupling_index(tip_stiffness(chosen[reached], cell, tool[reached]), process[reached])
+    return index
+
+
+def usual_coupling(poses: Poses, direction: Floats, cell: Cell) -> Floats:
+    """Return the index (n, 8) of each branch for a usual cut: up-milling, half as deep and wide as the mill.
+
+    It is asked for before there is a cut, to choose among poses. ``direction`` (n, 3) of the motion, or 0.
+    NaN out of reach.
+    """
+    material = cell.material
+    assert material is not None
+    law, index = law_array(material), np.full((len(direction), 8), np.nan)
+    axis = rotation_from_quaternion(np.ascontiguousarray(poses.rotation))[:, :, 2]
+    feed = across(direction, axis)
+    for number in np.unique(poses.tool).tolist():
+        rows, tool = np.flatnonzero(poses.tool == number), cell.tool[number]
+        depth, chip = np.array([tool.diameter_mm / 2.0]), np.array([_USUAL_CHIP_MM])
+        force = cutting_load(tool, law, _UP_HALF, depth, chip, peak=False).force_N[0]
+        slope = side_slope(_UP_HALF, depth, chip, tool.teeth, tool.diameter_mm, law)[0]
+        normal = np.cross(axis[rows], feed[rows])
+        way = np.stack([feed[rows], normal, -axis[rows]], axis=2)
+        sideways, deeper = way @ slope, way @ (-force / depth[0])
+        process = sideways[:, :, None] * normal[:, None, :] + deeper[:, :, None] * axis[rows][:, None, :]
+        q_rad = robot.inverse(poses.position_mm[rows], poses.rotation[rows], cell, number).reshape(-1, 6)
+        found = coupling_index(tip_stiffness(q_rad, cell, number), np.repeat(process, 8, axis=0))
+        index[rows] = found.reshape(-1, 8)
     return index
 
 
