@@ -13,6 +13,7 @@ from gcode2krl.clearance import ArmInStock, Beside, Inside, moves_watched_at_tar
 from gcode2krl.compiled.threads import ahead
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.pilot import to_pilot_frame
+from gcode2krl.pose.chatter import ChatterWatch
 from gcode2krl.prediction.limits import AccelerationLimit, DeflectionLimit, ForceLimits
 from gcode2krl.tables import (
     Clearance,
@@ -274,6 +275,7 @@ class Loads:
             ForceLimits(cell),
             DeflectionLimit(cell, "" if self._missing is not None else compliance.stiffness(cell).assumed),
         )
+        self._chatter = ChatterWatch(toolpath, cell)
         self._cuts = np.zeros(len(toolpath), dtype=np.bool_)
         self._waiting: tuple[Motion, Floats, Floats] | None = None
         self.count = 0
@@ -330,6 +332,8 @@ class Loads:
         line = self._toolpath.source_line[np.clip(motion.move, 0, len(self._toolpath) - 1)]
         self._force_limits.take(forces, line)
         self._cuts[motion.move[np.isfinite(forces.phi_rad[:, 0]) & (motion.move > 0)]] = True
+        if self._force_limits.absurd is None:
+            self._chatter.take(motion, q_rad, forces, line)
         deflection = None
         if self._missing is None and self._force_limits.absurd is None:
             with np.errstate(all="ignore"):  # an absurd result becomes a finding
@@ -351,7 +355,7 @@ class Loads:
             return Outcome(None, None, (*issues, limits.absurd))
         guessed = any(issue.code == "stock-guessed" for issue in issues)
         feeds = program.feeds_per_tooth(self._toolpath, self._cell, self._cuts)
-        force_issues = (*issues, *limits.issues(guessed), *feeds)
+        force_issues = (*issues, *limits.issues(guessed), *feeds, *self._chatter.issues())
         if self._missing is not None:
             return Outcome(force_issues, None, (replace(self._missing, severity="note"),))
         if bent.absurd is not None:

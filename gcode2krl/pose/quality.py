@@ -91,6 +91,8 @@ class Judge(NamedTuple, Generic[Choice]):
     """(r, 8)"""
     bending_mm: Callable[[Ints, Choice], Floats] | None = None
     """(r, 8), NaN out of reach; None where stiffness does not count."""
+    coupling: Callable[[Ints, Choice], Floats] | None = None
+    """(r, 8) index of mode coupling of a usual cut, see `chatter`; None where nothing is known of cuts."""
 
 
 def stacked(qualities: list[Quality]) -> Quality:

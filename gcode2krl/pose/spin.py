@@ -4,7 +4,8 @@
 where it is good enough (the smoothest choice); otherwise an angle that changes slowly along the path, found
 by dynamic programming over a grid. It is chosen at targets; on a long move it goes evenly from one to the
 other, as the controller turns the tool, and the points in between count with the angle there. ``stiffest``
-takes the angle at which the arm bends least, within the same limits.
+takes the angle at which the arm bends least, within the same limits, and of those about as stiff the one
+farthest from mode coupling (`chatter`).
 """
 
 from dataclasses import replace
@@ -18,9 +19,10 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import at_rest, points_moved, standing, to_rest, vectors_turned
 from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.pose.chatter import usual_coupling
 from gcode2krl.pose.path import between, cheapest_track, extremes, way_mm
 from gcode2krl.pose.quality import Judge, Poses, Quality, bending_mm, quality_at, quality_of, stacked
-from gcode2krl.tables import Joints, Motion, rows_at
+from gcode2krl.tables import Joints, Motion, chord_directions, rows_at
 from gcode2krl.units import RAD_PER_DEG
 
 GOOD_ENOUGH = 0.3
@@ -32,6 +34,9 @@ STIFF_MARGIN = 0.15
 _GRID_RAD = 5.0 * RAD_PER_DEG
 _WORTH_TURNING = 0.02
 """Fraction of the mean deflection that a changing angle must save compared with a constant one."""
+_AS_STIFF = 0.05
+"""Fraction of the mean deflection that a turn may cost that keeps off mode coupling."""
+_COUPLED = 12
 _CHANGE_COST = 0.05
 _IMPOSSIBLE_COST = 1e3
 _SAMPLES = 400
@@ -102,9 +107,13 @@ def spin_along(
         rotation = tool_rotation(seen_axis[rows], spin_rad)
         return Poses(seen_mm[rows], rotation, path_tool[rows], None if at is None else at[rows])
 
+    direction = chord_directions(seen_mm)
     judge = Judge[float](
         lambda rows, spin_rad: quality_of(poses(rows, spin_rad), cell),
         lambda rows, spin_rad: bending_mm(poses(rows, spin_rad), cell),
+        None
+        if cell.material is None
+        else lambda rows, spin_rad: usual_coupling(poses(rows, spin_rad), direction[rows], cell),
     )
     search = stiffest_spin if cell.frames.spin == "stiffest" else smooth_spin
     is_target = points.share == 0.0
@@ -156,6 +165,8 @@ def stiffest_spin(
 ) -> Floats | float:
     """Return the turn in rad that bends least: one number, or (p,) where a changing angle saves more.
 
+    Of constant turns that bend at most `_AS_STIFF` more than the least, that with the lowest index of mode
+    coupling of a usual cut is taken.
     One branch serves the whole program; see `smooth_spin`, which decides where no turn has `STIFF_MARGIN`
     throughout.
     """
@@ -175,6 +186,15 @@ def stiffest_spin(
     total, track = knots.cheapest_track(cost)
     if total < (1.0 - _WORTH_TURNING) * len(rows):
         return knots.along(spins_rad[track])
+    if judge.coupling is not None:
+        near = np.flatnonzero(least <= (1.0 + _AS_STIFF) * least[best])
+        some = rows[np.unique(np.linspace(0, len(rows) - 1, min(_COUPLED, len(rows))).astype(np.int64))]
+        branches = np.argmin(constant[near], axis=1)
+        index = [
+            judge.coupling(some, float(spins_rad[at]))[:, b] for at, b in zip(near, branches, strict=True)
+        ]
+        order = np.lexsort((least[near], np.round(np.nanmax(index, axis=1), 2)))
+        best = int(near[order[0]])
     return _rounded(spins_rad[best])
 
 

@@ -21,7 +21,7 @@ KEYS = [(section, key) for section in SECTIONS for key in descriptions_of(sectio
 UNITS = {
     "mm": "mm", "deg": "deg", "s": "s", "N": "N", "Nm": "N·m", "W": "W", "rpm": "rpm", "kg": "kg", "hz": "Hz",
     "mb": "MB", "percent": "%", "kgm2": "kg·m²", "deg_s": "deg/s", "deg_s2": "deg/s²", "m_s": "m/s",
-    "m_s2": "m/s²", "mm_s": "mm/s", "mm_s2": "mm/s²", "1_s": "1/s", "Nm_A": "N·m/A",
+    "m_s2": "m/s²", "mm_s": "mm/s", "mm_s2": "mm/s²", "1_s": "1/s", "Nm_A": "N·m/A", "N_mm": "N/mm",
 }  # fmt: skip
 """What the end of a key says of its unit."""
 NO_UNITS = ("k_s", "i_1_s", "d_s")

@@ -17,7 +17,7 @@ NO_MEASURE = (
     "max_active", "rest_cycles", "most_cycles", "settle_cycles", "port", "timeout_cycles", "lost_cycles",
     "decimals", "t1_output", "ready_output", "run_cw_output", "run_ccw_output", "speed_analog_output",
     "at_speed_input", "flood_output", "mist_output", "number", "max_lines", "comment_every",
-    "memory_moves", "warn_size_mb",
+    "memory_moves", "warn_size_mb", "tool",
 )  # fmt: skip  # word list, kept compact
 """Numbers that name or count something; their types bound them. Effects state their own bounds."""
 

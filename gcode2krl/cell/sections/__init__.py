@@ -54,6 +54,7 @@ from gcode2krl.cell.sections.robot import (
     Payload,
     Robot,
     Speeds,
+    TapMode,
     VirtualJoint,
     VirtualJointName,
 )
@@ -119,6 +120,7 @@ __all__ = [
     "Sure",
     "Table",
     "TakenOver",
+    "TapMode",
     "Tool",
     "ToolNumber",
     "Unconfirmed",

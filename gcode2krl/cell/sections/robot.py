@@ -236,6 +236,18 @@ VIRTUAL_JOINTS = ("A1", "A2", "linked_arm", "A3", "arm", "A4", "A5", "A6", "sens
 VirtualJointName = Literal["A1", "A2", "linked_arm", "A3", "arm", "A4", "A5", "A6", "sensor", "spindle"]
 
 
+class TapMode(Section):
+    """A mode of a tool's tip that a tap test has found."""
+
+    tool: Annotated[int, Field(strict=True, ge=1, le=99999)]
+    direction: Literal["x", "y"]
+    """Of ``$BASE``."""
+    frequency_hz: Positive
+    stiffness_N_mm: Positive
+    damping: Annotated[float, Field(strict=True, gt=0, lt=0.5)]
+    """Ratio, 1 = critical."""
+
+
 class Compliance(Provenance):
     """The virtual joints of robot and end effector; without all of them no deflection is predicted."""
 
@@ -246,6 +258,8 @@ class Compliance(Provenance):
     """Half-width of the 90 % band of the stiffness, relative."""
     modes_hz: tuple[Positive, ...] = ()
     """Structural modes that the spindle and tooth-passing frequencies should avoid."""
+    tap_modes: tuple[TapMode, ...] = ()
+    """Modes of tool tips, from tap tests; without them regenerative chatter is not judged."""
     robot_source: str = ""
     robot_sure: Sure = "unknown"
 

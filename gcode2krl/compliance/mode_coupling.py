@@ -1,0 +1,91 @@
+"""Mode coupling: when the force that follows the tip's own displacement makes it swing by itself.
+
+A tip of stiffness K is displaced by u, depth and width of cut change with it, and so does the mean force, by
+Kp·u (the *process stiffness*, `cutting.process_stiffness`). With one mass m for all directions
+
+    m·u'' + C·u' + (K - g·Kp)·u = 0,    C = 2·zeta·sqrt(m)·sqrt(K)
+
+at the gain g = 1. K is symmetric, Kp is not: two stiffnesses near each other are coupled into one growing
+oscillation (flutter), and a part of Kp that is larger than K pulls the tool in. Neither needs waves that the
+tooth before left on the surface, so it happens at the arm's own low frequency at any spindle speed.
+
+Sources, known from their abstracts: Pan, Zhang, Zhu & Wang 2006 (Chatter analysis of robotic machining
+process): K - Kp of an arm; Cen & Melkote 2017 (CCT-based mode coupling chatter avoidance in robotic milling):
+choice of the pose; Mousavi, Gagnol, Bouzgarrou & Ray 2018 (Stability optimization in robotic milling through
+the control of functional redundancies): choice of the turn about the tool axis. The equations here follow
+from the balance of forces; `benchmarks/mode_coupling.py` holds them against a simulation in time.
+
+Left out: regeneration (`cutting.lobes`), mass that differs with direction, damping other than `DAMPING`, the
+part of the force that follows the tip's velocity, the bending of spindle and tool themselves.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from gcode2krl.arrays import Floats
+from gcode2krl.cell import Cell
+from gcode2krl.compliance.deflection import displace
+
+DAMPING = 0.02
+"""Damping ratio of the arm's modes, an assumption: tap tests of milling robots find 0.01 to 0.05."""
+MOST_GAIN = 16.0
+"""Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
+_GAINS = np.geomspace(1.0 / 16.0, MOST_GAIN, 17)
+_HALVINGS = 7
+_LOAD_N = 1.0
+
+
+def tip_stiffness(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
+    """Return the stiffness (n, 3, 3) in N/mm of the tip against forces, along the axes of ``$BASE``.
+
+    ``q_rad`` (n, 6). Raises `NotUnderstoodError` where the cell does not state the stiffness.
+    """
+    root_from_base = cell.base_matrix()[:3, :3]
+    bent = [
+        displace(q_rad, _LOAD_N * root_from_base[:, axis], np.zeros(3), cell, tool)[0] @ root_from_base
+        for axis in range(3)
+    ]
+    flexibility = np.stack(bent, axis=2) / _LOAD_N
+    return np.asarray(np.linalg.inv((flexibility + flexibility.transpose(0, 2, 1)) / 2.0))
+
+
+def coupling_index(stiffness_N_mm: Floats, process_N_mm: Floats, damping: float = DAMPING) -> Floats:
+    """Return the index (n,) of mode coupling: 1/g of the least gain g > 0 at which the tip swings by itself.
+
+    From 1 on the cut is unstable as predicted; at 0.5 it would be at twice the force. Frequency and mass drop
+    out. NaN where the stiffness is not finite.
+
+    Parameters
+    ----------
+    stiffness_N_mm : (n, 3, 3) of the tip, symmetric and positive.
+    process_N_mm : (n, 3, 3) change of the mean force on the tool by a displacement of its tip.
+    damping : ratio, that of each mode.
+    """
+    finite = np.asarray(np.isfinite(stiffness_N_mm + process_N_mm).all(axis=(1, 2)))
+    scale = np.where(finite, np.trace(stiffness_N_mm, axis1=1, axis2=2) / 3.0, 1.0)[:, None, None]
+    stiffness = np.where(finite[:, None, None], stiffness_N_mm / scale, np.eye(3))
+    process = np.where(finite[:, None, None], process_N_mm / scale, 0.0)
+    values, modes = np.linalg.eigh(stiffness)
+    drag = 2.0 * damping * (modes * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ modes.transpose(0, 2, 1)
+
+    def grows(gain: Floats) -> Floats:
+        system = np.zeros((len(gain), 6, 6))
+        system[:, :3, 3:] = np.eye(3)
+        system[:, 3:, :3] = gain[:, None, None] * process - stiffness
+        system[:, 3:, 3:] = -drag
+        return np.asarray(np.linalg.eigvals(system).real.max(axis=1))
+
+    low, high = np.zeros(len(scale)), np.full(len(scale), np.inf)
+    for gain in _GAINS:
+        open_ = np.isinf(high)
+        if not open_.any():
+            break
+        unstable = grows(np.full(len(scale), gain)) > 1e-9
+        high = np.where(open_ & unstable, gain, high)
+        low = np.where(open_ & ~unstable, gain, low)
+    found = np.isfinite(high)
+    for _ in range(_HALVINGS):
+        middle = np.where(found, (low + high) / 2.0, 0.0)
+        unstable = grows(middle) > 1e-9
+        high, low = np.where(found & unstable, middle, high), np.where(found & ~unstable, middle, low)
+    return np.where(finite, np.where(found, 1.0 / np.where(found, high, 1.0), 0.0), np.nan)
