@@ -99,6 +99,9 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     """Yield code, text for the cell and options, for each error whose printed remedy can be followed."""
     codes = {code for code, _ in first.errors}
     messages = {code: [m for c, m in first.errors if c == code] for code in codes}
+    dialects = re.findall(r"-> --dialect ([a-z-]+)", first.printed)
+    if "other-dialect" in codes and dialects:
+        yield "other-dialect", "", ("--dialect", dialects[0])
     if "g43-missing" in codes:
         yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
     if any("it was stopped by" in message for message in messages.get("spindle-off", ())):
