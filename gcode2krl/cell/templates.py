@@ -137,6 +137,8 @@ def render(template: str, values: Mapping[str, Any]) -> str:
 
     Raises `MissingValueError` where a needed key is None, `TemplateError` for any other mistake.
     """
+    if "{" not in template and "\r" not in template and len(template) <= MOST_CHARACTERS:
+        return template.strip("\n")  # as Jinja2 has it: half of a cell's templates are a word such as HALT
     try:
         compiled = _compiled(template)
         used = {key: _plain(key, value) for key, value in values.items()}
