@@ -163,6 +163,13 @@ def _say(result: "Geometry", console: Console) -> None:
         good = values[~result.is_outlier]
         high = np.quantile(good, 0.95)
         console.say(f"  {name:<7} mean {good.mean():.3f}, 95 % {high:.3f}, most {good.max():.3f} mm{said}")
+    if result.curves is not None:
+        errors = (60.0 * float(np.abs(curve.error_deg).max()) for curve in result.curves.joints)
+        words = ", ".join(f"A{joint} {error:.1f}'" for joint, error in enumerate(errors, 1))
+        console.say(
+            f"  curves  {result.rms_with_curves_mm:.3f} mm rms at places left out with an error curve of "
+            f"each joint over its angle (gear, encoder), up to {words}"
+        )
     if result.repeatability_mm is not None:
         console.say(f"  ISO 9283 repeatability RP {result.repeatability_mm:.3f} mm, of poses visited again")
     console.say(f"  {'number':<24} {'value':>10}  {result.level:.0%} interval")
@@ -213,6 +220,7 @@ _KEYS = (
     "rms_before_mm",
     "rms_after_mm",
     "rms_within_mm",
+    "rms_with_curves_mm",
     "points",
     "outliers",
     "noise_mm",
@@ -224,6 +232,7 @@ _KEYS = (
     "condition",
     "alike",
     "frame",
+    "curves",
     "rows",
 )
 
@@ -251,6 +260,9 @@ def _record(result: "Geometry") -> dict[str, Any]:
         "root_in_instrument": {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "c_deg": c},
         "targets_in_flange_mm": result.alignment.targets_mm.tolist(),
     }
+    curves = None
+    if result.curves is not None:
+        curves = [{name: value.tolist() for name, value in c._asdict().items()} for c in result.curves.joints]
     rows = {
         "line": result.row.tolist(),
         "before_mm": result.before_mm.tolist(),
@@ -264,6 +276,7 @@ def _record(result: "Geometry") -> dict[str, Any]:
         result.rms_before_mm,
         result.rms_after_mm,
         float(np.sqrt(np.mean(good**2))),
+        result.rms_with_curves_mm,
         len(result.row),
         int(result.is_outlier.sum()),
         result.noise_mm,
@@ -275,6 +288,7 @@ def _record(result: "Geometry") -> dict[str, Any]:
         result.condition,
         [list(pair) for pair in result.alike],
         frame,
+        curves,
         rows,
     )
     return dict(zip(_KEYS, values, strict=True))

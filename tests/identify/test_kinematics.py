@@ -152,6 +152,27 @@ def test_intervals_hold_the_truth_nine_times_in_ten():
     assert 0.8 < np.mean(inside) < 0.98
 
 
+def test_error_curves_of_joints_are_told_where_they_are():
+    arm = pose_arms.clean(pose_arms.KR300, 3)
+    columns = pose_arms.measured(arm, 900, 7).columns()
+    plain = identify_kinematics(read_readings(columns), arm_named(arm.name))
+    assert plain.curves is None
+    assert plain.rms_with_curves_mm is None
+    for joint in (1, 3):
+        columns[f"q{joint}_deg"] = columns[f"q{joint}_deg"] - _wave_deg(columns[f"q{joint}_deg"])
+    found = identify_kinematics(read_readings(columns), arm_named(arm.name))
+    assert found.rms_with_curves_mm < 0.4 * found.rms_after_mm
+    for joint, curve in enumerate(found.curves.joints, 1):
+        wanted = _wave_deg(curve.angle_deg) if joint in (1, 3) else np.zeros(len(curve.angle_deg))
+        error = curve.error_deg - wanted
+        assert np.std(error) < 0.007  # beside a constant, which is a zero's
+
+
+def _wave_deg(q_deg):
+    """Twenty waves a turn of 1.2 arcmin."""
+    return 0.02 * np.sin(20.0 * np.radians(q_deg))
+
+
 def test_play_by_the_order_of_the_rows():
     arm = pose_arms.MadeUp(**{**pose_arms.KR300.__dict__, "half_play_rad": (1e-4, 2e-4, 0.0, 0.0, 1e-4, 0.0)})
     table = pose_arms.measured(arm, 250, 1)

@@ -46,7 +46,7 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmG
     if not all(_can_be_fitted(pair) for pair in pairs):
         return None
     tables = [_poses(pair) for pair in pairs]
-    options = Options(groups=GEOMETRY)
+    options = Options(groups=GEOMETRY, curves=False)
     arm = arm_of(pairs[0].inputs.cell)
     read = _readings(tables[:explaining])
     try:

@@ -27,7 +27,7 @@ def section_of(readings: Readings, arm: Arm, options: Options) -> tuple[list[dic
     Raises as `identify_kinematics` does.
     """
     groups = ("zeros", "lengths", "axes", *(g for g in ("drift", "air") if g in options.groups))
-    fit = identify_kinematics(readings, arm, replace(options, groups=groups, only=_EFFECTS))
+    fit = identify_kinematics(readings, arm, replace(options, groups=groups, only=_EFFECTS, curves=False))
     entries = []
     for part in fit.parts:
         if part.name in _EFFECTS and part.is_told and not part.estimate.contains(0.0):

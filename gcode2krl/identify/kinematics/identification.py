@@ -11,6 +11,7 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.identify.estimate import LEVEL, Estimate, around, student
 from gcode2krl.identify.kinematics.alignment import Alignment, aligned
 from gcode2krl.identify.kinematics.arms import Arm, all_arms
+from gcode2krl.identify.kinematics.curves import Curves, curves_of
 from gcode2krl.identify.kinematics.fit import Fit, fitted, steps_of
 from gcode2krl.identify.kinematics.parameters import GEOMETRY, GROUPS, Model, Poses, flange_of, model_of
 from gcode2krl.identify.kinematics.readings import Readings, approach_by_order
@@ -45,6 +46,8 @@ class Options:
     gravity_root: tuple[float, float, float] = (0.0, 0.0, -1.0)
     masses_kg: Sequence[float] | None = None
     """Of the upper arm, the forearm, and of hand and tool; None: each link's weight is fitted."""
+    curves: bool = True
+    """Look for an error curve of each joint over its angle."""
     only: Container[str] | None = None
     """Names of the arm's numbers that are fitted; None: all of the groups."""
     folds: int = _FOLDS
@@ -102,6 +105,8 @@ class Geometry:
     theta: Floats
     repeatability_mm: float | None = None
     """ISO 9283's RP, mean + 3 sigma, over poses visited three times or more; None where there are none."""
+    curves: Curves | None = None
+    """What each joint errs by over its angle beside the numbers, where that is a fifth and more."""
 
     @property
     def rms_before_mm(self) -> float:
@@ -112,6 +117,11 @@ class Geometry:
     def rms_after_mm(self) -> float:
         """The same, of points that were left out."""
         return _rms(self.after_mm[~self.is_outlier])
+
+    @property
+    def rms_with_curves_mm(self) -> float | None:
+        """The same with the curves of the joints; None where there are none."""
+        return None if self.curves is None else _rms(self.curves.after_mm[~self.is_outlier])
 
     @property
     def told(self) -> tuple[Part, ...]:
@@ -176,6 +186,7 @@ def identify_kinematics(readings: Readings, arm: Arm, options: Options = Options
         alignment=alignment,
         theta=whole.theta,
         repeatability_mm=_repeatability(poses, index, q_rad),
+        curves=curves_of(model, whole, poses, places, after, arm.signs.tolist()) if options.curves else None,
     )
 
 
