@@ -196,7 +196,7 @@ def test_heidenhain_rounds_compensated_contours():
 
 def test_an_arc_that_touches_what_leads_to_it_leaves_a_compensated_contour_so():
     """Along y = 0 to x = 50, and on by a quarter about (50, 20), beside which the tool has 20 - 5 mm."""
-    text, toolpath = read(
+    _, toolpath = read(
         "4 L X+0 Y-20 RL F100\n5 L Y+0\n6 L X+50\n7 CT X+70 Y+20\n8 L Y+60\n9 L X+40 R0", "heidenhain"
     )
     around = [p for p in toolpath.position_mm[:, :2] if p[0] > 50 + 1e-9 and p[1] < 20 - 1e-9]
