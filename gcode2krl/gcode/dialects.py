@@ -162,7 +162,7 @@ REASONS: Final = (
         "height; one"
         " that touches what leads to it (CT) stands behind a move in the plane that it leaves at an angle, "
         "without"
-        " G41 and rotations",
+        " rotations, and under G41 behind the move that leads in",
         "let the post write G2 and G3",
     ),
     (

@@ -86,7 +86,9 @@ static bool direction_before(const Block *b, const Arc *arc, Point *along) {
     const State *s = b->state;
     const Rows *rows = &b->machine->rows;
     const int64_t last = b->counts->rows - 1;
-    if (s->rotated || compensates(s) || last < 1 || AT(rows->machine, last))
+    if (compensates(s))
+        return contour_direction(s, along);
+    if (s->rotated || last < 1 || AT(rows->machine, last))
         return false;
     if (s->arc_end_rows == b->counts->rows) {
         *along = (Point){s->arc_end[0], s->arc_end[1]};

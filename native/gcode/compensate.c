@@ -244,6 +244,12 @@ void stand_beside(State *s) {
     s->cutter_mode &= ~S_CUTTER_BESIDE;
 }
 
+/* Find the direction in which a compensated contour has come to its programmed point; return false where none has begun. */
+bool contour_direction(const State *s, Point *along) {
+    *along = held_direction(s);
+    return s->cutter_entered;
+}
+
 /* --- corners -------------------------------------------------------------------------------------------- */
 
 /* Go around an outside corner as a Fanuc does: along both moves to where they meet, or, where the path turns by more

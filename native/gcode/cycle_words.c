@@ -137,8 +137,12 @@ static bool take_dwell(Block *b, Cycle *c) {
     State *s = b->state;
     if (!needs_dwell(s->motion) && !taps(s->motion))
         return true;
-    if (!b->has[V_WORD_P] && needs_dwell(s->motion) && b->motion_before != s->motion)
-        return fails(b, 0, FC_NO_DWELL, (Says){.a = s->motion * V_TENFOLD});
+    if (!b->has[V_WORD_P] && needs_dwell(s->motion) && b->motion_before != s->motion) {
+        const bool none_holds = !s->in_cycles || s->cycle_p == 0.0 || s->motion == V_CYCLE_BORE_STOP;
+        if (b->machine->programs != D_PROGRAMS_FANUC || !none_holds)
+            return fails(b, 0, FC_NO_DWELL, (Says){.a = s->motion * V_TENFOLD});
+        s->cycle_p = 0.0; /* a Fanuc does not dwell then */
+    }
     c->dwell_s = b->has[V_WORD_P] ? b->word[V_WORD_P] : s->cycle_p;
     s->cycle_p = c->dwell_s;
     return c->dwell_s >= 0.0 || fails(b, 0, FC_DWELL_NEGATIVE, (Says){.a = c->dwell_s});

@@ -194,6 +194,20 @@ def test_heidenhain_rounds_compensated_contours():
     assert len(ours) > 12
 
 
+def test_an_arc_that_touches_what_leads_to_it_leaves_a_compensated_contour_so():
+    """Along y = 0 to x = 50, and on by a quarter about (50, 20), beside which the tool has 20 - 5 mm."""
+    _, toolpath = read(
+        "4 L X+0 Y-20 RL F100\n5 L Y+0\n6 L X+50\n7 CT X+70 Y+20\n8 L Y+60\n9 L X+40 R0", "heidenhain"
+    )
+    around = [p for p in toolpath.position_mm[:, :2] if p[0] > 50 + 1e-9 and p[1] < 20 - 1e-9]
+    np.testing.assert_allclose(np.hypot(*(np.array(around) - [50, 20]).T), 15, atol=1e-9)
+    assert len(around) > 5
+    assert (
+        way("G41 G1 X0 Y-20\nY0\nX50\nCT X70 Y20\nG1 Y60\nG40 X40").tolist()
+        == toolpath.position_mm[3:, :2].tolist()
+    )
+
+
 def test_fanuc_rounds_compensated_contours():
     cell = over_demonstration(TOOLS | {"program": {"cutter": {"lead_in": "a", "d": "radius"}}})
     path = way("G42 D1 G1 X0. Y-20.\nY0.\nX50. ,R6.\nY50. ,C4.\nX0.\nG40 X-40.", "fanuc", cell)

@@ -133,6 +133,15 @@ def test_what_hangs_on_parameters_that_nobody_stated_is_refused(lines, stated, f
     assert errors(lines, *stated)[0] == found
 
 
+@pytest.mark.parametrize("cycle", ["G82", "G86", "G89"])
+def test_a_cycle_of_a_fanuc_without_p_does_not_dwell(cycle):
+    hole = f"G98 {cycle} X5. Y5. Z-5. R1."
+    assert read(hole).dwell_s.sum() == read(f"{hole}\nX9.").dwell_s.sum() == 0.0
+    assert read(f"{hole} P500\nX9.").dwell_s.sum() == 1.0
+    kept = errors(f"G98 G82 X5. Y5. Z-5. R1. P500\n{hole[4:]}")
+    assert bool(kept) == (cycle == "G89")
+
+
 def test_g10_may_set_what_the_cell_states():
     lines = "G10 L10 P1 R60.\nG10 L12 P1 R{}\nG10 L11 P1 R0.\nG10 L13 P1 R0.\nG1 X1."
     assert way(lines.format("5."), "a", "radius") == way(lines.format("10."), "a", "diameter") == [[1, 0]]
