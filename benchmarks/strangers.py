@@ -102,6 +102,8 @@ def remedies(first: Attempt, extent_mm: str) -> Iterator[tuple[str, str, tuple[s
     dialects = re.findall(r"-> --dialect ([a-z-]+)", first.printed)
     if "other-dialect" in codes and dialects:
         yield "other-dialect", "", ("--dialect", dialects[0])
+    if "[program.cutter]" in first.printed:
+        yield "dialect-code", '[program.cutter]\nlead_in = "a"\nd = "radius"\n', ()
     if "g43-missing" in codes:
         yield "g43-missing", '[program]\ntool_length = "from_table"\n', ()
     if any("it was stopped by" in message for message in messages.get("spindle-off", ())):

@@ -105,11 +105,16 @@ def _is_there(file: Path, sha256: str) -> bool:
 
 def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -> Record:
     """Return the line of a part: its record with the names of this batch, whoever computed it and when."""
+<<<<<<< HEAD
     part, cell = planned.part, record["cell"]
     line: Record = {
+=======
+    part, cell, order = planned.part, record["cell"], planned.task.order
+    found: Record = {
+>>>>>>> desk
         **record,
         "input": record["input"] and record["input"] | {"file": str(part.file)},
-        "cell": cell and cell | {"file": None if part.cell is None else str(part.cell)},
+        "cell": cell and cell | {"file": None if order.cell_path is None else str(order.cell_path)},
         "options": _options(planned, record["options"]),
         "files": [f"{part.folder}{name}" for name in record["files"]],
         "sha256": {f"{part.folder}{name}": sha256 for name, sha256 in record["sha256"].items()},
@@ -123,7 +128,7 @@ def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -
 
 
 def _options(planned: Planned, options: Record) -> Record:
-    job = planned.part.job
+    job = planned.task.order.job_path
     return options | ({"job_path": str(job)} if "job_path" in options and job is not None else {})
 
 

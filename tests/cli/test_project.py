@@ -1,6 +1,7 @@
 """``gcode2krl.toml``: options of a folder, what a command line states first, and what is wrong in one."""
 
 import json
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -87,7 +88,11 @@ def test_one_batch_translates_two_dialects_in_two_cells_and_a_broken_cell_fails_
         folder,
         'cell = "cell.toml"\n[[files]]\nmatch = "shop/*"\ndialect = "sinumerik"\ncell = "other.toml"\n',
     )
-    assert run("batch", "mill", "shop", "-o", "out").code == 0
+    done = run("batch", "mill", "shop", "-o", "out")
+    assert done.code == 0
+    assert "demonstration cell" not in done.out + done.err
+    files = {part: Path(told["cell"]["file"]).name for part, told in records("out").items()}
+    assert files == {"mill/a.nc": "cell.toml", "shop/b.mpf": "other.toml"}
     names = {part: told["cell"]["name"] for part, told in records("out").items()}
     assert names["shop/b.mpf"] == "the other" != names["mill/a.nc"]
     (folder / "bad.toml").write_text("[stock]\nbox = 3\n", encoding="utf-8")

@@ -141,6 +141,14 @@ def test_two_instruments_do_not_burst_together():
     assert kinds(sorted_out(runs(shaken(3.7, 21), *calm), spans)) == [Whose.INSTRUMENT]
 
 
+def test_a_pulse_of_a_sensor_that_bursts_is_one_more_burst():
+    """Three bursts beside it; of an encoder a pulse stays a blow."""
+    y = shaken([3.7, 11.3, 16.7], 24) + blow(7.2)
+    assert kinds(sorted_out(runs(y, link="force"), {})) == [Whose.INSTRUMENT] * 4
+    assert Whose.IMPULSE in kinds(sorted_out(runs(y), {}))
+    assert Whose.IMPULSE in kinds(sorted_out(runs(shaken(3.7, 24) + blow(7.2), link="force"), {}))
+
+
 def test_what_is_commanded_has_no_events():
     y = 1e-4 * shaken(7.2, 2)
     (planned,) = runs(y, link="path")

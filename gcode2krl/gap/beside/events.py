@@ -12,7 +12,8 @@ level before and after it:
   together.
 - a pulse (`pulses`), or rough in two tables at once: an impulse of the machine. Its rows are a model of their
   own, so the rest is judged without them; it is told with moment, size and width, and is a gap.
-- else the instrument's: a burst. It is left out, and that is told.
+- else the instrument's: a burst. It is left out, and that is told. Of a tracker or a force sensor that has
+  three of these a pulse is one more.
 
 "In step" is a binomial test: of k events at least so many fall into a share f of the time by chance.
 """
@@ -74,12 +75,13 @@ def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]])
     repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
     shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
     coincident = _in_step(traces, stretches, shared, least=1)
-    return [
+    found = [
         _sorted(_Levels(trace, rest), own, [a or b for a, b in zip(command, again, strict=True)], both)
         for trace, rest, own, command, again, both in zip(
             traces, rests, stretches, commanded, repeated, coincident, strict=True
         )
     ]
+    return [_of_a_bursty_instrument(trace) for trace in found] if _is_bursty(found) else found
 
 
 def line_at(inputs: Inputs, at_s: float) -> int:
@@ -333,6 +335,20 @@ def _sorted(
         events=(*trace.events, *events),
         left_out=(*trace.left_out, *told),
     )
+
+
+def _is_bursty(traces: Sequence[Trace]) -> bool:
+    """Tell whether a tracker or a force sensor bursts so often that a pulse of it may be a burst, too."""
+    bursts = sum(event.whose is Whose.INSTRUMENT for trace in traces for event in trace.events)
+    return not traces[0].link.of_joints and bursts >= _LIMITS.bursty_least
+
+
+def _of_a_bursty_instrument(trace: Trace) -> Trace:
+    events = (
+        replace(event, whose=Whose.INSTRUMENT) if event.whose is Whose.IMPULSE else event
+        for event in trace.events
+    )
+    return replace(trace, events=tuple(events))
 
 
 class _Levels:

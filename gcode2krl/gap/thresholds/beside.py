@@ -80,6 +80,12 @@ class BesideThresholds:
     bursts_most: float = convention(
         0.15, "share of a component's rows up to which bursts are left out: more is how the signal is"
     )
+    bursty_least: int = calibrated(
+        3,
+        DEVELOPMENT,
+        "bursts from which on a pulse of a tracker or a force sensor is one more: of 5 sound links with pulses all "
+        "had so many, of 60 links with effects and pulses none",
+    )
     pulse_around_s: float = convention(0.4, "around a pulse: the level it leaves and comes back to")
     pulse_widths_s: tuple[float, ...] = convention(
         (0.02, 0.05, 0.1), "of pulses that are looked for: blows and snags take 20 to 100 ms"
