@@ -105,13 +105,8 @@ def _is_there(file: Path, sha256: str) -> bool:
 
 def line_of(planned: Planned, record: Record, *, seconds: float, cached: bool) -> Record:
     """Return the line of a part: its record with the names of this batch, whoever computed it and when."""
-<<<<<<< HEAD
-    part, cell = planned.part, record["cell"]
-    line: Record = {
-=======
     part, cell, order = planned.part, record["cell"], planned.task.order
-    found: Record = {
->>>>>>> desk
+    line: Record = {
         **record,
         "input": record["input"] and record["input"] | {"file": str(part.file)},
         "cell": cell and cell | {"file": None if order.cell_path is None else str(order.cell_path)},
