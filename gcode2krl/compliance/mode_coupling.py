@@ -19,10 +19,12 @@ Left out: regeneration (`cutting.lobes`), mass that differs with direction, damp
 part of the force that follows the tip's velocity, the bending of spindle and tool themselves.
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.compliance.deflection import displace
 
@@ -30,9 +32,11 @@ DAMPING = 0.02
 """Damping ratio of the arm's modes, an assumption: tap tests of milling robots find 0.01 to 0.05."""
 MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
-_GAINS = np.geomspace(1.0 / 16.0, MOST_GAIN, 17)
+_LEAST_GAIN, _STEP = 1.0 / 16.0, math.sqrt(2.0)
 _HALVINGS = 7
 _LOAD_N = 1.0
+_LEAST_MM_N = 1e-12
+"""Flexibility of a rigid arm, so that it has a stiffness."""
 
 
 def tip_stiffness(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
@@ -45,11 +49,13 @@ def tip_stiffness(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) 
         displace(q_rad, _LOAD_N * root_from_base[:, axis], np.zeros(3), cell, tool)[0] @ root_from_base
         for axis in range(3)
     ]
-    flexibility = np.stack(bent, axis=2) / _LOAD_N
+    flexibility = np.stack(bent, axis=2) / _LOAD_N + _LEAST_MM_N * np.eye(3)
     return np.asarray(np.linalg.inv((flexibility + flexibility.transpose(0, 2, 1)) / 2.0))
 
 
-def coupling_index(stiffness_N_mm: Floats, process_N_mm: Floats, damping: float = DAMPING) -> Floats:
+def coupling_index(
+    stiffness_N_mm: Floats, process_N_mm: Floats, damping: float = DAMPING, most_gain: float = MOST_GAIN
+) -> Floats:
     """Return the index (n,) of mode coupling: 1/g of the least gain g > 0 at which the tip swings by itself.
 
     From 1 on the cut is unstable as predicted; at 0.5 it would be at twice the force. Frequency and mass drop
@@ -60,6 +66,7 @@ def coupling_index(stiffness_N_mm: Floats, process_N_mm: Floats, damping: float 
     stiffness_N_mm : (n, 3, 3) of the tip, symmetric and positive.
     process_N_mm : (n, 3, 3) change of the mean force on the tool by a displacement of its tip.
     damping : ratio, that of each mode.
+    most_gain : up to which an instability is looked for; an index below its inverse is 0.
     """
     finite = np.asarray(np.isfinite(stiffness_N_mm + process_N_mm).all(axis=(1, 2)))
     scale = np.where(finite, np.trace(stiffness_N_mm, axis1=1, axis2=2) / 3.0, 1.0)[:, None, None]
@@ -68,24 +75,24 @@ def coupling_index(stiffness_N_mm: Floats, process_N_mm: Floats, damping: float 
     values, modes = np.linalg.eigh(stiffness)
     drag = 2.0 * damping * (modes * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ modes.transpose(0, 2, 1)
 
-    def grows(gain: Floats) -> Floats:
-        system = np.zeros((len(gain), 6, 6))
+    def grows(rows: Ints, gain: Floats) -> Bools:
+        system = np.zeros((len(rows), 6, 6))
         system[:, :3, 3:] = np.eye(3)
-        system[:, 3:, :3] = gain[:, None, None] * process - stiffness
-        system[:, 3:, 3:] = -drag
-        return np.asarray(np.linalg.eigvals(system).real.max(axis=1))
+        system[:, 3:, :3] = gain[:, None, None] * process[rows] - stiffness[rows]
+        system[:, 3:, 3:] = -drag[rows]
+        return np.asarray(np.linalg.eigvals(system).real.max(axis=1) > 1e-9)
 
     low, high = np.zeros(len(scale)), np.full(len(scale), np.inf)
-    for gain in _GAINS:
-        open_ = np.isinf(high)
-        if not open_.any():
-            break
-        unstable = grows(np.full(len(scale), gain)) > 1e-9
-        high = np.where(open_ & unstable, gain, high)
-        low = np.where(open_ & ~unstable, gain, low)
+    gain = _LEAST_GAIN
+    while gain <= most_gain * (1.0 + 1e-9):
+        rows = np.flatnonzero(np.isinf(high))
+        unstable = grows(rows, np.full(len(rows), gain))
+        high[rows[unstable]], low[rows[~unstable]] = gain, gain
+        gain *= _STEP
     found = np.isfinite(high)
+    rows = np.flatnonzero(found)
     for _ in range(_HALVINGS):
-        middle = np.where(found, (low + high) / 2.0, 0.0)
-        unstable = grows(middle) > 1e-9
-        high, low = np.where(found & unstable, middle, high), np.where(found & ~unstable, middle, low)
+        middle = (low[rows] + high[rows]) / 2.0
+        unstable = grows(rows, middle)
+        high[rows[unstable]], low[rows[~unstable]] = middle[unstable], middle[~unstable]
     return np.where(finite, np.where(found, 1.0 / np.where(found, high, 1.0), 0.0), np.nan)

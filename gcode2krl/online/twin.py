@@ -60,7 +60,7 @@ class World:
     """Stiffness of the compensator's model over the truth: measured deviations are 6 % larger (section
     3.1)."""
     pilot_scale: float = 0.93
-    """Pilot force over the truth: with measured coefficients four slots agree within 6-9 %."""
+    """Pilot force over the truth: within the range of a fit, held-out slots are off by up to 7.5 %."""
     sensor_gain: float = 1.0
     """Normal mismatch ± 2 %."""
     noise_N: float = 3.0

@@ -15,7 +15,7 @@ from gcode2krl import robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compliance import missing_stiffness, stiffness
-from gcode2krl.compliance.mode_coupling import coupling_index, tip_stiffness
+from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_stiffness
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import law_array
 from gcode2krl.cutting.lobes import depth_limit
@@ -48,7 +48,14 @@ class Coupling(NamedTuple):
 
 
 def coupling_along(
-    toolpath: Toolpath, motion: Motion, q_rad: Floats, forces: Forces, cell: Cell, *, spins: bool = False
+    toolpath: Toolpath,
+    motion: Motion,
+    q_rad: Floats,
+    forces: Forces,
+    cell: Cell,
+    *,
+    spins: bool = False,
+    most_gain: float = MOST_GAIN,
 ) -> Coupling:
     """Return the index at up to `JUDGED` samples that cut, and with ``spins`` the map over the turn.
 
@@ -69,7 +76,7 @@ def coupling_along(
     process = process_stiffness(cut, moved, toolpath, cell)
     turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)
     over = [_turned(moved, pose, cut.tool, process, cell, float(turn)) for turn in turns]
-    index = coupling_index(tip_stiffness(pose, cell, cut.tool), process)
+    index = coupling_index(tip_stiffness(pose, cell, cut.tool), process, most_gain=most_gain)
     return Coupling(rows, index, turns, np.array(over).reshape(len(turns), len(rows)))
 
 
@@ -140,7 +147,7 @@ class ChatterWatch:
     def take(self, motion: Motion, q_rad: Floats, forces: Forces, line: Ints32) -> None:
         """Judge the next samples (m), of which ``line`` is the G-code line."""
         if self._couples:
-            along = coupling_along(self._toolpath, motion, q_rad, forces, self._cell)
+            along = coupling_along(self._toolpath, motion, q_rad, forces, self._cell, most_gain=1.0)
             index = np.nan_to_num(along.coupling)
             at = int(np.argmax(index)) if len(index) else -1
             if at >= 0 and (self._worst is None or index[at] > self._worst[0]):

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.mode_coupling import draw, index_of, simulate
 from gcode2krl import load_cell
 from gcode2krl.cell import resolve_cell
-from gcode2krl.cell.sections import TapMode
+from gcode2krl.cell.sections import VIRTUAL_JOINTS, TapMode
 from gcode2krl.compliance import displace
 from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_stiffness
 from gcode2krl.cutting import mean_force
@@ -28,6 +28,14 @@ def test_the_tips_stiffness_is_that_of_small_loads():
     bent = displace(Q_RAD, to_root @ force, np.zeros(3), cell)[0] @ to_root
     np.testing.assert_allclose(np.einsum("nij,nj->ni", stiff, bent), [force, force], rtol=2e-3)
     assert (np.linalg.eigvalsh(stiff) > 0.0).all()
+
+
+def test_a_rigid_arm_does_not_couple():
+    rigid = {name: {"k_c": 9.9e99, "k_b": 9.9e99, "k_a": 9.9e99} for name in VIRTUAL_JOINTS}
+    cell = resolve_cell({"based_on": "demonstration", "compliance": {"virtual_joints": rigid}})
+    process = np.full((2, 3, 3), 100.0)
+    np.testing.assert_array_equal(coupling_index(tip_stiffness(Q_RAD, cell), process), [0.0, 0.0])
+    assert np.isnan(coupling_index(tip_stiffness(Q_RAD * np.nan, cell), process)).all()
 
 
 @pytest.mark.parametrize(
