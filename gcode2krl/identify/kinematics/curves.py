@@ -57,20 +57,20 @@ def curves_of(
         axis, place = acts[f"A{joint + 1}"]
         turned = signs[joint] * np.cross(axis, plain - place)
         bends.append(turned[:, :, None] * basis[:, None, :])
-    columns = np.concatenate([slopes * steps_of(model), *(_CURVE_RAD * each for each in bends)], axis=2)
+    columns = np.concatenate([slopes * steps_of(model), *(_CURVE_RAD * bend for bend in bends)], axis=2)
     if 3 * int(good.sum()) < 2 * columns.shape[2]:
         return None
     off = poses.measured_mm - tip
-    blocks = {int(place): _normal(columns, off, good & (places == place)) for place in np.unique(places)}
-    gram, score = (sum(each) for each in zip(*blocks.values(), strict=True))
+    blocks = {int(k): _normal(columns, off, good & (places == k)) for k in np.unique(places)}
+    gram, score = (sum(parts) for parts in zip(*blocks.values(), strict=True))
     solution = _solved(columns[good], off[good], gram, score, fit.sigma_mm)
-    left = np.empty(len(off))
-    for place, (own_gram, own_score) in blocks.items():
-        out = places == place
+    curved_mm = np.empty(len(off))
+    for number, (own_gram, own_score) in blocks.items():
+        out = places == number
         rows = good & ~out
         known = _solved(columns[rows], off[rows], gram - own_gram, score - own_score, fit.sigma_mm)
-        left[out] = np.linalg.norm(off[out] - columns[out] @ known, axis=1)
-    if np.mean(left[good] ** 2) > _BRINGS**2 * np.mean(after_mm[good] ** 2):
+        curved_mm[out] = np.linalg.norm(off[out] - columns[out] @ known, axis=1)
+    if np.mean(curved_mm[good] ** 2) > _BRINGS**2 * np.mean(after_mm[good] ** 2):
         return None
     sizes = np.cumsum([slopes.shape[2], *(len(angle) for angle, _ in hats)])
     return Curves(
@@ -78,7 +78,7 @@ def curves_of(
             Curve(angle * DEG_PER_RAD, _CURVE_RAD * DEG_PER_RAD * solution[start:end])
             for (angle, _), start, end in zip(hats, sizes[:-1], sizes[1:], strict=True)
         ),
-        left,
+        curved_mm,
     )
 
 
