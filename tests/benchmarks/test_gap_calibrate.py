@@ -74,8 +74,8 @@ def test_a_test_that_parts_right_from_wrong_gets_the_weight():
 
 
 def test_a_test_that_speaks_the_wrong_way_gets_none():
-    rows = [row("beside", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
-    assert dict(zip(TERMS, fit.fitted(rows, NAME).weights, strict=True))["beside"] == 0.0
+    rows = [row("rival", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
+    assert dict(zip(TERMS, fit.fitted(rows, NAME).weights, strict=True))["rival"] == 0.0
 
 
 def test_a_left_out_effect_teaches_nothing_about_itself():

@@ -127,6 +127,9 @@ def test_of_an_effect_in_no_joint_alone_only_the_joints_that_it_moves_are_near()
     ]
     found = c.examined(made, [coupling])
     (tests,) = LinkFamilies(found, made).tests
+    assert tests.components == {0}
+    rest = LinkFamilies(found, made).rest.study.evidences
+    assert {each.place.name for each in rest if tests.is_near(each)} == {"A1"}
     assert tests.is_alone
 
 
@@ -139,15 +142,15 @@ def test_an_effect_that_states_no_family_is_its_own():
 
 
 def test_each_test_alone_forbids_the_name():
-    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None)
+    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset())
     # most of what can be told, a hundredth of the gap
-    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None)
+    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None, frozenset())
     assert passes(hidden)
     assert passes(good)
     for worse in (
-        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None),
-        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None),
+        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset()),
+        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None, frozenset()),
+        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None, frozenset()),
     ):
         assert not passes(worse)
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.features import NAMES, FamilyFeatures, Features, family_features
+from gcode2krl.gap.choose.features import MOST_NATS, NAMES, FamilyFeatures, Features, family_features
 from gcode2krl.gap.choose.judgement import judge
 from gcode2krl.gap.tell.as_json import plain
 from gcode2krl.gap.tell.causes import cause_of
@@ -36,8 +36,9 @@ def test_a_right_cause_has_good_tests():
     assert found.fold_agreement == 1.0
     assert found.shrink_of_rest > 0.95
     assert found.shrink_where_others == 1.0  # nothing is above it
-    assert (found.share_left, found.conditions_failed) == (0.0, 0)
-    assert found.causes == 1
+    assert (found.share_left, found.rest_share, found.conditions_failed) == (0.0, 0.0, 0)
+    assert (found.causes, found.alike) == (1, 0)
+    assert found.rival_nats == MOST_NATS  # there is no other effect
     assert found.inconstancy < 0.1
     # a sine of 2 sigma has an rms of √2 in values of one sigma
     assert found.size_over_noise == pytest.approx(2.0**0.5, rel=0.25)
@@ -56,6 +57,12 @@ def test_a_size_that_differs_from_run_to_run_is_inconstant():
     found = features([1.0 * y, 3.0 * y])
     assert found.inconstancy > 0.2
     assert found.constant_p < 1e-3
+
+
+def test_a_twin_counts_as_alike_and_not_as_a_rival():
+    found = features([2.0 * EFFECT.form(TIME_S)] * 2, effects=(EFFECT, wave(2.0, "twin")))
+    assert found.alike == 1
+    assert found.rival_nats == MOST_NATS
 
 
 def test_the_object_names_every_test_and_rounds_to_four_digits():

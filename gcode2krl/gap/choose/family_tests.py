@@ -56,9 +56,15 @@ class FamilyTests:
     """The best member of its own family."""
     better: Evidence | None
     """The best other family with the cause taken out."""
+    components: frozenset[int]
+    """Of the signal, which the cause moves."""
     family_behind: float | None = None
     """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
     None where its family says nothing."""
+
+    def is_near(self, evidence: Evidence) -> bool:
+        """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
+        return _is_in(self.components, evidence)
 
     @property
     def is_best(self) -> bool:
@@ -228,6 +234,7 @@ class LinkFamilies:
             family=own[0] if own else None,
             family_behind=(form_nats - own[0].nats) / own[0].inflation if own else None,
             better=better,
+            components=components,
         )
 
     def _components(self, number: int) -> frozenset[int]:

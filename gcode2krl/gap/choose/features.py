@@ -1,5 +1,6 @@
 """The results of all tests of a cause, gathered: what its probability is made of, and what the JSON shows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from gcode2krl.effects import Role
@@ -7,9 +8,12 @@ from gcode2krl.gap.choose.constancy import Constancy
 from gcode2krl.gap.choose.examination import Examination
 from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
 from gcode2krl.gap.choose.intervals import Interval
+from gcode2krl.gap.choose.rivals import Rival
 from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.families.nested import lead_nats
+from gcode2krl.gap.thresholds import THRESHOLDS
 
+_LIMITS = THRESHOLDS.choose
 MOST_NATS = 1000.0
 """Evidence beyond it says no more; also where there is nothing to compare with."""
 _DIGITS = 4
@@ -49,8 +53,16 @@ class Features:
     """Of the gap on held-out data, the share that all causes of the link take."""
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
+    rest_share: float
+    """Of the gap, what the best family there takes beside all causes; 0 if insignificant."""
+    rival_nats: float
+    """By how much the best effect that the data can tell from it is worse."""
+    alike: int
+    """Number of effects that the data cannot tell from it."""
     causes: int
     """Number of causes that were accepted in the link."""
+    links_missing: int
+    """Number of links without data."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -124,13 +136,18 @@ def features_of(
     number: int,
     *,
     tests: FamilyTests,
+    rest: Rest,
     gap_p: float,
     constant: Constancy | None,
     parameters: dict[str, Interval],
+    rivals: Sequence[Rival],
     held_out: HeldOut,
 ) -> Features:
     """Return the features of an accepted effect."""
     chi2 = found.likelihood.chi2(found.without(number))
+    # by convention, not by the table, which is made from these numbers
+    told = [rival for rival in rivals if rival.behind_nats >= _LIMITS.alike_chi2 / 2.0]
+    near = [each for each in rest.worth_naming if tests.is_near(each)]
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(chi2 - found.fitted.chi2, 0.0) / found.data.values) ** 0.5,
@@ -147,7 +164,11 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
+        rest_share=max((rest.share(each) for each in near), default=0.0),
+        rival_nats=_within(min((each.behind_nats for each in told), default=MOST_NATS)),
+        alike=len(rivals) - len(told),
         causes=len(found.causes),
+        links_missing=len(found.question.upstream),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,

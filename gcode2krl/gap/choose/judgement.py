@@ -269,9 +269,11 @@ def _causes(
             found,
             number,
             tests=tests,
+            rest=every,
             gap_p=families.gap_p[order],
             constant=constant,
             parameters=intervals[number],
+            rivals=rivals,
             held_out=_held_out(found, order, sizes, every, trials),
         )
         table = probabilities_table()
