@@ -18,6 +18,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERITIES = ("error", "warning", "note")
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
 NOT_CODES = {
+    "c-a",
+    "c-b",
     "v-bit",
     "shape-type",
     "tip-diameter",

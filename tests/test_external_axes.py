@@ -100,7 +100,10 @@ def test_axes_that_stay_are_as_a_cell_that_stands_there(at, tmp_path):
     assert np.allclose(one.forces.force_base_N, other.forces.force_base_N)
     assert np.allclose(one.deflection.deflection_base_mm, other.deflection.deflection_base_mm, atol=1e-9)
     assert np.allclose(one.clearance.clearance_mm, other.clearance.clearance_mm, equal_nan=True, atol=1e-6)
-    assert [(i.code, i.line) for i in one.issues] == [(i.code, i.line) for i in other.issues]
+    other_issues = [
+        issue for issue in other.issues if issue.code != "mode-coupling"
+    ]  # not judged beside a rail
+    assert [(i.code, i.line) for i in one.issues] == [(i.code, i.line) for i in other_issues]
     assert (one.motion.external[:, :2] == at).all()
 
 

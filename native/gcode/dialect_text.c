@@ -290,7 +290,9 @@ static int64_t cycle_call(Scan *scan, Evaluation *e, int64_t i, int64_t number_o
 /* Write what the statement makes whose name stands from i to end. */
 static int64_t statement(Scan *scan, Evaluation *e, int64_t i, int64_t end, int64_t line) {
     const Bytes text = scan->text;
-    const int32_t kind = kind_of(scan, i, end + stands_at(text, end, '['));
+    int32_t kind = stands_at(text, end, '[') ? kind_of(scan, i, end + 1) : -1; /* an array's name has its [ */
+    if (kind < 0)
+        kind = kind_of(scan, i, end);
     const int64_t behind = behind_blanks(text, end);
     const bool is_assigned = stands_at(text, behind, '=');
     switch (kind < 0 ? -1 : kind % D_KIND_STEP) {

@@ -278,9 +278,9 @@ def test_an_archive_is_read_back_to_the_same_cell(run, tmp_path, name):
         assert ours.frames.base is None
         return
     assert ours.robot.trafo_name == f"{theirs.robot.trafo_name} C4 FLR ZH02"
-    named = ours.model_copy(
-        update={"robot": ours.robot.model_copy(update={"trafo_name": theirs.robot.trafo_name})}
-    )
+    assert ours.robot.drives.gear_ratio == pytest.approx([1798 / 7] * 6)
+    of_theirs = {"trafo_name": theirs.robot.trafo_name, "drives": theirs.robot.drives}
+    named = ours.model_copy(update={"robot": ours.robot.model_copy(update=of_theirs)})
     assert (ours.controller.kss, theirs.controller.kss) == ("8.3", None)  # the answers do not state it
     assert without_provenance(named) == without_provenance(stated(theirs, kss="8.3"))
     assert ours.robot.limits.source == "archive archive.zip, $SOFTN_END and $SOFTP_END"

@@ -111,7 +111,7 @@ def test_program_translates_without_findings(run, tmp_path):
     outcome = run("test.nc", "-o", "test.src", "--json", "--strict")
     assert outcome.code == 0
     codes = [issue["code"] for issue in json.loads(outcome.out)["issues"]]
-    assert codes == ["cell-not-verified", "exact-stops", "stock-guessed"]  # stops on purpose
+    assert codes == ["cell-not-verified", "exact-stops", "corner-undecided", "stock-guessed"]  # on purpose
     assert "$APO.CDIS=5.000" in (tmp_path / "test.src").read_text()
 
 
