@@ -84,7 +84,7 @@ class BesideThresholds:
         3,
         DEVELOPMENT,
         "bursts from which on a pulse of a tracker or a force sensor is one more: 5 sound links with pulses "
-        "had so many, of 60 links with effects and pulses none",
+        "had so many, of 46 links with effects and pulses none",
     )
     pulse_around_s: float = convention(0.4, "around a pulse: the level it leaves and comes back to")
     pulse_widths_s: tuple[float, ...] = convention(
