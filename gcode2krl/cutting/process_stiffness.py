@@ -27,7 +27,7 @@ _TANGENT_RAD = 0.1
 """An arc's end nearer than this to 0 or pi is the tangent of the wall that the tool cuts."""
 
 
-def process_stiffness(forces: Forces, motion: Motion, toolpath: Toolpath, cell: Cell) -> Floats:
+def stiffness_of_cut(forces: Forces, motion: Motion, toolpath: Toolpath, cell: Cell) -> Floats:
     """Return dF/du (m, 3, 3) in N/mm along ``$BASE``: column j is the change by a displacement along axis j.
 
     Rows as in ``forces`` and ``motion``; 0 where nothing is cut. Raises an input error where the material has

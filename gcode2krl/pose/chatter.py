@@ -19,7 +19,7 @@ from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_st
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import law_array
 from gcode2krl.cutting.lobes import depth_limit
-from gcode2krl.cutting.process_stiffness import across, process_stiffness, side_slope
+from gcode2krl.cutting.process_stiffness import across, side_slope, stiffness_of_cut
 from gcode2krl.errors import Issue
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.pose.quality import Poses
@@ -73,7 +73,7 @@ def coupling_along(
     rows = np.flatnonzero(cuts)
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
     cut, moved, pose = rows_at(forces, rows), rows_at(motion, rows), q_rad[rows]
-    process = process_stiffness(cut, moved, toolpath, cell)
+    process = stiffness_of_cut(cut, moved, toolpath, cell)
     turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)
     over = [_turned(moved, pose, cut.tool, process, cell, float(turn)) for turn in turns]
     index = coupling_index(tip_stiffness(pose, cell, cut.tool), process, most_gain=most_gain)
