@@ -58,10 +58,3 @@ def test_a_signal_with_little_of_the_gap_is_less_certain():
     loud, quiet = (next(each for each in found if each.evidence.place.name == at) for at in ("A1", "A2"))
     assert quiet.features.of_largest == pytest.approx(quiet.evidence.nats / loud.evidence.nats, rel=1e-6)
     assert quiet.probability < loud.probability
-
-
-def test_a_step_and_a_drift_are_one_statement():
-    """Both say that it depends on time: neither is a rival of the other, and one of them is told."""
-    found = told([np.where(TIME_S > 6.2, 3.0, 0.0), np.zeros(len(TIME_S))])
-    of_a1 = [each.evidence.says for each in found if each.evidence.place.name == "A1"]
-    assert len(of_a1) == len(set(of_a1))

@@ -6,7 +6,7 @@ import pytest
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.families.evidence import Evidence
 from gcode2krl.gap.families.grid import Place
-from gcode2krl.gap.families.nested import CONTAINS, lead_nats, simplest_first
+from gcode2krl.gap.families.nested import CONTAINS, simplest_first
 
 
 def evidence(on, nats, place="tip"):
@@ -56,30 +56,3 @@ def test_families_of_other_places_and_without_evidence_stay():
     assert order(*apart) == [(Dependence.PLACE, 1000.0), (Dependence.CONSTANT, 995.0)]
     poor = [evidence(Dependence.PLACE, -1.0), evidence(Dependence.CONSTANT, -1.01)]
     assert order(*poor) == [(Dependence.PLACE, -1.0), (Dependence.CONSTANT, -1.01)]
-
-
-def test_the_lead_goes_by_the_rule_of_the_order():
-    """Of two families neither leads where they change places, and the one told first leads the other."""
-    for nats in (850.0, 899.0, 901.0, 990.0, 1010.0):
-        first, second = simplest_first(
-            [evidence(Dependence.RUN_TIME, 1000.0), evidence(Dependence.FORCE, nats)]
-        )
-        assert lead_nats(first, second) == pytest.approx(abs(nats - 900.0))
-        assert lead_nats(second, first) == pytest.approx(-abs(nats - 900.0))
-
-
-def test_the_more_a_family_that_contains_it_says_the_less_it_leads():
-    leads = []
-    for nats in (900.0, 990.0, 1005.0, 1015.0):
-        first, second = simplest_first(
-            [evidence(Dependence.PLACE, nats), evidence(Dependence.CONSTANT, 1000.0)]
-        )
-        assert first.on is Dependence.CONSTANT
-        leads.append(lead_nats(first, second))
-    assert leads == sorted(leads, reverse=True)
-    assert leads[-1] == pytest.approx(1000.0 - 0.98 * 1015.0)
-
-
-def test_the_lead_over_any_other_family_is_the_difference():
-    here, there = evidence(Dependence.FORCE, 30.0), evidence(Dependence.VELOCITY, 12.0, place="A1")
-    assert lead_nats(here, there) == 18.0 == -lead_nats(there, here)

@@ -10,7 +10,6 @@ from gcode2krl.gap.choose.family_tests import FamilyTests, Rest
 from gcode2krl.gap.choose.intervals import Interval
 from gcode2krl.gap.choose.rivals import Rival
 from gcode2krl.gap.families.evidence import Evidence
-from gcode2krl.gap.families.nested import lead_nats
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
@@ -85,10 +84,7 @@ class FamilyFeatures:
     """What is known of a family that the rest of a gap depends on."""
 
     lead_nats: float
-    """By how much it is ahead of the best other family of its signal or of none, over the inflation.
-
-    One that contains it counts for as much less as it may be ahead (`families.nested`). A step and a drift
-    say the same: that it depends on time."""
+    """Its evidence over that of the best other family of its signal or of none, over the inflation."""
     share: float
     """Of the gap's power, what it takes."""
     p: float
@@ -108,11 +104,10 @@ FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 def family_features(rest: Rest, evidence: Evidence, larger_links: int = 0) -> FamilyFeatures:
     """Return the features of a family of a rest; those of other signals, of another joint, are no rivals."""
-    of_signal = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
-    leads = [lead_nats(evidence, each) for each in of_signal if each.says != evidence.says]
-    own = evidence.nats - evidence.swapped_nats
+    rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
+    other = max((each.nats for each in rivals if each is not evidence), default=0.0)
     return FamilyFeatures(
-        lead_nats=_within(min([own, *leads]) / of_signal[0].inflation),
+        lead_nats=_within((evidence.nats - max(other, 0.0)) / rivals[0].inflation),
         share=rest.share(evidence),
         p=rest.study.p_of(evidence),
         of_largest=min(max(evidence.nats, 0.0) / max(rest.study.evidences[0].nats, 1.0), 1.0),

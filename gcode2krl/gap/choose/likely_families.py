@@ -48,11 +48,7 @@ def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbabil
 
 def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:
     """Return the families of one signal, in the order of the study."""
-    said: dict[object, Evidence] = {}
-    for each in rest.study.evidences:
-        if each.place.component == component:
-            said.setdefault(each.says, each)
-    first, *others = said.values()
+    first, *others = [each for each in rest.study.evidences if each.place.component == component]
     features = family_features(rest, first, larger_links)
     own = probabilities_table().dependence(features)
     behind = np.array([max(first.nats - each.nats, 0.0) / first.inflation for each in others])

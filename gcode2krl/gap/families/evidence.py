@@ -44,19 +44,11 @@ class Evidence:
     """A step is in later runs, too."""
     in_one: float = 0.0
     """Of its gain, the share of one stretch of time at most: a sample at a sharp corner may have it all."""
-    swapped_nats: float = 0.0
-    """By how much `nats` is more than its own, since it changed places with a family that contains it."""
 
     @property
     def key(self) -> tuple[str, Dependence]:
         """Return where and on what."""
         return self.place.name, self.on
-
-    @property
-    def says(self) -> tuple[str, Dependence]:
-        """Return where and on which input: a step depends on time as a drift does."""
-        is_step = self.on is Dependence.RUN_TIME_STEP
-        return self.place.name, Dependence.RUN_TIME if is_step else self.on
 
 
 def evidence_of(

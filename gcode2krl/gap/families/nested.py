@@ -48,27 +48,9 @@ def simplest_first(evidences: Iterable[Evidence]) -> tuple[Evidence, ...]:
             j = next((j for j in range(i + 1, len(told)) if _is_within(told[j], larger)), None)
             if j is None or larger.nats - told[j].nats >= _ahead_share(larger) * larger.nats:
                 continue
-            told[i], told[j] = _with_nats(told[j], larger.nats), _with_nats(larger, told[j].nats)
+            told[i], told[j] = replace(told[j], nats=larger.nats), replace(larger, nats=told[j].nats)
             moved = True
     return tuple(told)
-
-
-def lead_nats(first: Evidence, other: Evidence) -> float:
-    """Return by how many nats a family is ahead of another, by the same rule as it is told before it.
-
-    Of a family that contains the other, what it may be ahead by is taken off; so that of two families neither
-    leads where they would change places.
-    """
-    own, others = first.nats - first.swapped_nats, other.nats - other.swapped_nats
-    if _is_within(first, other):
-        others -= _ahead_share(other) * max(others, 0.0)
-    elif _is_within(other, first):
-        own -= _ahead_share(first) * max(own, 0.0)
-    return own - others
-
-
-def _with_nats(evidence: Evidence, nats: float) -> Evidence:
-    return replace(evidence, nats=nats, swapped_nats=evidence.swapped_nats + nats - evidence.nats)
 
 
 def _ahead_share(larger: Evidence) -> float:
