@@ -20,20 +20,16 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.families
 _COMMANDED = (
-    *(
-        Dependence.OWN_ANGLE,
-        Dependence.MOTOR_ANGLE,
-        Dependence.REVERSALS,
-        Dependence.OWN_TORQUE,
-        Dependence.PLACE,
-    ),
-    *(
-        Dependence.VELOCITY,
-        Dependence.ACCELERATION,
-        Dependence.JERK,
-        Dependence.FORCE,
-        Dependence.FORCE_BY_PLACE,
-    ),
+    Dependence.OWN_ANGLE,
+    Dependence.MOTOR_ANGLE,
+    Dependence.REVERSALS,
+    Dependence.OWN_TORQUE,
+    Dependence.PLACE,
+    Dependence.VELOCITY,
+    Dependence.ACCELERATION,
+    Dependence.JERK,
+    Dependence.FORCE,
+    Dependence.FORCE_BY_PLACE,
 )
 """Where the robot is and what it does; what grows with time a drift of the instrument imitates."""
 
@@ -136,7 +132,7 @@ def _p(found: Sequence[Evidence], nats: float) -> float:
 
 
 def command_p(found: Sequence[Evidence]) -> float:
-    """Return p of the largest evidence of what the command alone gives, where runs are moved in time.
+    """Return p of the largest evidence of what the command gives, where runs are moved in time; 1 of joints.
 
     Of its root, which is as an amplitude: the evidence itself has a longer tail than Gumbel's.
     """
