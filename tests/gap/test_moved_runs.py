@@ -6,9 +6,9 @@ from scipy.sparse import csr_array
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.families.columns import Columns
-from gcode2krl.gap.families.evidence import evidence_of
+from gcode2krl.gap.families.evidence import evidence_of, moved_evidence
 from gcode2krl.gap.families.grid import Place
-from gcode2krl.gap.families.study import command_p
+from gcode2krl.gap.families.study import Study
 from gcode2krl.gap.families.view import View
 from gcode2krl.gap.fit.split_columns import SplitColumns
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -35,15 +35,15 @@ def view(rest):
         members=csr_array((np.ones(rows), (stretches, np.arange(rows)))),
         components=np.zeros(rows, dtype=int),
         runs=np.repeat(np.arange(RUNS), COUNT),
-        moves=THRESHOLDS.families.moves,
     )
 
 
-def evidence(rest, on=Dependence.REVERSALS):
-    columns = np.concatenate([command(number) for number in range(RUNS)])
+def command_p(rest, on=Dependence.REVERSALS):
+    columns = Columns(np.concatenate([command(number) for number in range(RUNS)]))
     parts = [command(number)[None] for number in range(RUNS)]
-    place = Place("tip", Where.TIP, [np.ones((1, COUNT, 1))] * RUNS)
-    return evidence_of(view(rest), place, on, parts, Columns(columns), (np.eye(2),), np.ones((1, 48)))
+    place, roots = Place("tip", Where.TIP, [np.ones((1, COUNT, 1))] * RUNS), (np.eye(2),)
+    found = evidence_of(view(rest), place, on, parts, columns, roots, np.ones((1, 48)))
+    return Study(0.0, (found,), 1.0, moved=lambda: moved_evidence(view(rest), columns, roots)).command_p
 
 
 def wander(draw):
@@ -68,9 +68,8 @@ def test_a_moved_run_is_the_run_and_all_its_components_move_together():
         members=csr_array(np.ones((1, 2 * COUNT))),
         components=np.repeat([0, 1], COUNT),
         runs=np.zeros(2 * COUNT, dtype=int),
-        moves=7,
     )
-    for row in both.moved.reshape(7, 2, COUNT):
+    for row in both.moved.reshape(-1, 2, COUNT)[:7]:
         by = [k for k in range(COUNT) if np.allclose(np.abs(row), np.abs(np.roll(values, k, axis=1)))]
         assert len(by) == 1
         assert 0.04 * COUNT < by[0] < 0.96 * COUNT
@@ -81,14 +80,14 @@ def test_what_turns_back_with_the_robot_is_no_noise():
     draw = np.random.default_rng(1)
     late = np.linspace(0.2, 1.0, COUNT)
     rest = [draw.standard_normal(COUNT) + 4.0 * late * command(number)[:, 0] for number in range(RUNS)]
-    assert command_p([evidence(rest)]) <= THRESHOLDS.families.gap_p
-    assert command_p([evidence(rest, Dependence.TRAVEL)]) == 1.0
+    assert command_p(rest) <= THRESHOLDS.families.gap_p
+    assert command_p(rest, Dependence.TRAVEL) == 1.0
 
 
 def test_noise_with_a_memory_and_bursts_does_not_know_the_command():
     found = []
     for seed in range(400):
         draw = np.random.default_rng(seed)
-        found.append(command_p([evidence([wander(draw) for _ in range(RUNS)])]))
+        found.append(command_p([wander(draw) for _ in range(RUNS)]))
     assert sum(p <= THRESHOLDS.families.gap_p for p in found) <= 3
     assert sum(p < 1.0 for p in found) > 20

@@ -19,6 +19,11 @@ _PATHS = {
 """Signals that follow the commanded path closely: the path is interpolated by cubics, the rest by lines."""
 
 
+def follows_path(name: str) -> bool:
+    """Tell whether a signal follows the commanded path closely."""
+    return name in _PATHS
+
+
 def values_of(signals: Signals, name: str) -> Floats:
     """Return a signal (m, c); the motor side is the measured one where the inputs have it."""
     if name == "q_act_rad" and signals.inputs.q_act_rad is not None:

@@ -10,7 +10,15 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.beside.interpolation import (
+    LastPath,
+    cubic,
+    follows_path,
+    interpolate,
+    linear,
+    nearest_rows,
+    values_of,
+)
 from gcode2krl.gap.beside.simulator import Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -197,6 +205,25 @@ class Trace:
         return found
 
     @cached_property
+    def kinks(self) -> Floats:
+        """(n, k) the largest jump of the model's rate within two of its samples, 0 where it bends evenly.
+
+        Where a clock is off by less than a sample, the row may be on either side of the jump.
+        """
+        signals = self._plain
+        values, own_s = values_of(signals, self.plus), signals.time_s
+        if self.still or not follows_path(self.plus) or len(own_s) < 5:
+            return np.zeros(self.shape)
+        jumps = np.diff(np.diff(values, axis=0) / np.diff(own_s)[:, None], axis=0)
+        kinks = np.zeros_like(values)
+        kinks[2:-2] = np.abs(jumps[1:-1] - 0.5 * (jumps[:-2] + jumps[2:]))
+        near = np.maximum(kinks, np.maximum(np.roll(kinks, 1, axis=0), np.roll(kinks, -1, axis=0)))
+        if self.in_sensor_frame or self.in_tool_frame:  # whichever way they are turned
+            near = np.repeat(np.linalg.norm(near, axis=1, keepdims=True), near.shape[1], axis=1)
+        found: Floats = near[nearest_rows(own_s, self.time_s - self.plus_late_s)][:, list(self.columns)]
+        return found
+
+    @cached_property
     def _plain(self) -> Signals:
         return self._simulated(self.base)
 
@@ -222,13 +249,15 @@ class Trace:
     def model_error(self, applied: Sequence[Applied]) -> Floats:
         """Return by how much the model may be off (n, k) where it, not noise, is the limit.
 
-        To its accuracy come what its samples miss of a sharp corner: by how much every other one misses more.
+        To its accuracy come what its samples miss of a sharp corner: by how much every other one misses more,
+        and at a kink half a sample at the jump of the rate.
         """
         signals = self.signals(applied)
         times = signals.true_time(self.plus, self.time_s)
         values = values_of(signals, self.plus)[:, list(self.columns)]
         fine, coarse = cubic(times, signals.time_s, values), cubic(times, signals.time_s[::2], values[::2])
-        return self.link.model_rms + np.abs(fine - coarse)
+        kink = self.kinks * float(np.median(np.diff(signals.time_s))) / 4.0
+        return self.link.model_rms + np.abs(fine - coarse) + kink
 
     def signals(self, applied: Sequence[Applied]) -> Signals:
         """Return all signals of the model with these effects at work besides the base."""

@@ -107,8 +107,11 @@ class Rest:
     @property
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
-        if self.study.command_p <= _LIMITS.gap_p:
-            return True
+        return self._is_large or self.study.command_p <= _LIMITS.gap_p
+
+    @property
+    def _is_large(self) -> bool:
+        """Tell whether one is so by its size and by the signs of stretches."""
         best = max(self.study.evidences, key=self._nats_beyond_time, default=None)
         # of all that is known the form is known to a hundredth of its size, however long one looks at it
         if best is None or net_gain(best) < _LIMITS.form_error**2 * (self.gap_gain + self.upstream_gain):
@@ -135,7 +138,8 @@ class Rest:
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
         """Return the families that take a share of the gap worth naming, the most probable first."""
-        if not self.is_sized and min(self.study.p, self.study.command_p) > _LIMITS.significant_p:
+        least = _LIMITS.significant_p
+        if not self.is_sized and self.study.p > least and self.study.command_p > least:
             return ()
         return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 

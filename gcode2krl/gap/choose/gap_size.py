@@ -24,6 +24,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied
+from gcode2krl.effects.effect import JOINTS
 from gcode2krl.gap.beside.events import command_changes
 from gcode2krl.gap.beside.stretches import stretches_of
 from gcode2krl.gap.beside.trace import Trace
@@ -72,8 +73,8 @@ class Size:
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
     loud_in_step: float = 0.0
-    """The power of loud moments in step with the command over that of the noise, in one component; 0 where
-    that they are in step may be chance."""
+    """The power of loud moments in step with the command, or of one joint alone, over that of the noise; 0
+    where they may be chance."""
 
     @property
     def power(self) -> float:
@@ -134,7 +135,8 @@ def size_of_gap(
     """Return the size of the gap of some traces with and without effects; ``usual`` are normal mismatch."""
     left = [trace.measured - trace.sample([*usual, *applied]) for trace in traces]
     gap = [trace.measured - trace.sample(usual) for trace in traces]
-    own, shared = fitted_mismatch(Likelihood(traces, nuisance, noise), left)
+    likelihood = Likelihood(traces, nuisance, noise)
+    own, shared = fitted_mismatch(likelihood, left)
     # clocks, frames and zeros within normal mismatch are taken out of the data, before and after alike
     after, before = _less(left, own), _less(gap, own)
     sigma2 = sum(each.sigma**2 for each in noise)
@@ -154,7 +156,7 @@ def size_of_gap(
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
-        loud_in_step=_loud_in_step(traces, structured, noise),
+        loud_in_step=max(_loud_in_step(likelihood, structured), _rough_joint(likelihood, structured)),
     )
 
 
@@ -172,18 +174,37 @@ def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequen
     return sum(int(np.count_nonzero(rows.any(axis=1))) for rows in beyond)
 
 
-def _loud_in_step(traces: Sequence[Trace], left: Sequence[Floats], noise: Sequence[Noise]) -> float:
+def _rough_joint(likelihood: Likelihood, left: Sequence[Floats]) -> float:
+    """Return by how much more power over its noise's one joint has than most, in two runs; 0 where little.
+
+    Six encoders are alike: what is loud in few of them, for moments too, is no noise.
+    """
+    if likelihood.traces[0].components != JOINTS:
+        return 0.0
+    power = np.array(
+        [
+            [float(np.mean(likelihood.white(number, j, rest[:, [j]]) ** 2)) for j in range(len(JOINTS))]
+            for number, rest in enumerate(left)
+        ]
+    )
+    beyond = np.sort(power - np.median(power, axis=1, keepdims=True), axis=0)
+    share = float(np.max(beyond[-min(2, len(beyond))]))
+    return share if share > _LIMITS.rough_joint else 0.0
+
+
+def _loud_in_step(likelihood: Likelihood, left: Sequence[Floats]) -> float:
     """Return the largest power of a component's loud moments in step with the command over its noise's."""
+    traces, noise = likelihood.traces, likelihood.noise
     if traces[0].link.model_rms or traces[0].still:
         return 0.0
     changes = [_by_moments(command_changes(each).astype(np.float64), each) for each in traces]
     is_changing = np.asarray(np.concatenate(changes).any(axis=1), dtype=np.bool_)
     moment_s = _MOMENT_ROWS * max(float(np.median(np.diff(trace.time_s))) for trace in traces)
     shares = [0.0]
-    for j, component in enumerate(noise):
+    for j in range(len(noise)):
         rows = [
-            _by_moments(component.whiten(rest[:, [j]], trace.segments)[:, 0], trace)
-            for rest, trace in zip(left, traces, strict=True)
+            _by_moments(likelihood.white(number, j, rest[:, [j]])[:, 0], traces[number])
+            for number, rest in enumerate(left)
         ]
         power = np.mean(np.concatenate(rows) ** 2, axis=1)
         shares.append(_share_in_step(power, is_changing, len(noise), _EVENT_S / moment_s))

@@ -34,11 +34,7 @@ def along_one(
         signs,
         cost=float(np.log(max(every.gain, 1.0))),
     )
-    return (
-        None
-        if found is None
-        else replace(found, flipped=every.flipped, moved=every.moved, unbounded=every.unbounded)
-    )
+    return None if found is None else replace(found, flipped=every.flipped, unbounded=every.unbounded)
 
 
 def _main_axis(every: Evidence, family: Family) -> Floats:

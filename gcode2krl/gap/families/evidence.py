@@ -1,6 +1,6 @@
 """The evidence of a family: how much better functions of an input explain what is left than nothing does."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,8 +33,6 @@ class Evidence:
     """By how much a gain varies more than white noise lets it."""
     flipped: Floats
     """(flips,) its log evidence where the signs of stretches are random, and ``unbounded`` with their own."""
-    moved: Floats
-    """(moves,) its log evidence where each run's residual is moved in time."""
     unbounded: float
     signal: tuple[Floats, ...]
     """(n, k) what it says of each trace; k = 1 where it is of one component alone."""
@@ -70,21 +68,14 @@ def evidence_of(
     beside = Beside(view, columns)
     gram, score, scores = beside.gram, beside.score, beside.scores
     best: tuple[float, int, Floats, Floats] | None = None
-    flips, owns, moves = [], [], []
-    moved_scores = beside.moved_scores
-    for root in roots:
-        values, vectors = np.linalg.eigh(root.T @ gram @ root)
-        used = values > _RANK * max(float(values[-1]), 1e-30) if len(values) else values > 0
-        if not used.any() or values[-1] <= 1e-9:
-            continue
-        turned = root @ vectors[:, used]
-        own = log_evidence(values[used], turned.T @ score)
-        flips.append(log_mean(log_evidence(values[used], signs @ (scores @ turned))))
-        moves.append(log_mean(log_evidence(values[used], moved_scores @ turned)))
+    flips, owns = [], []
+    for values, turned in _along_roots(gram, roots):
+        own = log_evidence(values, turned.T @ score)
+        flips.append(log_mean(log_evidence(values, signs @ (scores @ turned))))
         owns.append(log_mean(own))
         top = int(np.argmax(own))
         if best is None or own[top] > best[0]:
-            best = (float(own[top]), top, values[used], turned)
+            best = (float(own[top]), top, values, turned)
     if best is None:
         return None
     _, top, values, turned = best
@@ -100,12 +91,30 @@ def evidence_of(
         gain=max(fit.gain, 0.0),
         inflation=gain_inflation(inverse, left, fitted=0),
         flipped=log_mean(np.array(flips).T) - cost,
-        moved=log_mean(np.array(moves).T) - cost,
         unbounded=float(log_mean(np.array(owns))) - cost,
         signal=tuple((own @ (turned @ fit.weights)).T for own in raw),
         at=at,
         in_one=_in_one(view, explained),
     )
+
+
+def _along_roots(gram: Floats, roots: Sequence[Floats]) -> Iterator[tuple[Floats, Floats]]:
+    """Yield for each root what of it can be observed: eigenvalues (c',) and directions (c, c')."""
+    for root in roots:
+        values, vectors = np.linalg.eigh(root.T @ gram @ root)
+        used = values > _RANK * max(float(values[-1]), 1e-30) if len(values) else values > 0
+        if used.any() and values[-1] > 1e-9:
+            yield values[used], root @ vectors[:, used]
+
+
+def moved_evidence(view: View, columns: Columns, roots: Sequence[Floats]) -> Floats:
+    """Return the log evidence (moves,) of columns where each run's residual is moved in time."""
+    beside = Beside(view, columns)
+    scores = beside.moved_scores
+    found = [
+        log_mean(log_evidence(values, scores @ turned)) for values, turned in _along_roots(beside.gram, roots)
+    ]
+    return log_mean(np.array(found).T) if found else np.full(len(scores), -np.inf)
 
 
 def _in_one(view: View, explained: Floats) -> float:

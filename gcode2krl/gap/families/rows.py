@@ -78,9 +78,7 @@ class Rows:
         return blocks
 
     def _averaged(self, number: int, component: int, values: Floats) -> Floats:
-        return self._in_blocks(
-            number, self.likelihood.noise[component].whiten(values, self.traces[number].segments)
-        )
+        return self._in_blocks(number, self.likelihood.white(number, component, values))
 
     def _in_blocks(self, number: int, white: Floats) -> Floats:
         starts = self.starts[number]

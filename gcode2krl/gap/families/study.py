@@ -1,7 +1,9 @@
 """All families of a link beside several views of it, and the null of the largest."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +11,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.gap.families.columns import Columns
 from gcode2krl.gap.families.directions import along_one
-from gcode2krl.gap.families.evidence import Evidence, evidence_of
+from gcode2krl.gap.families.evidence import Evidence, evidence_of, moved_evidence
 from gcode2krl.gap.families.grid import Grid, Place
 from gcode2krl.gap.families.nested import simplest_first
 from gcode2krl.gap.families.rows import Rows
@@ -49,10 +51,21 @@ class Study:
     That goes on where so many flips end.
     """
 
-    command_p: float = 1.0
-    """The same of the largest of what the command gives, where each run's rest is moved in time.
+    moved: Callable[[], Floats] = field(default=lambda: np.zeros(0), repr=False)
+    """(moves,) the largest evidence of what the command gives, where each run's rest is moved in time."""
 
-    Few strong stretches have few signs to flip, and yet do not stand where the robot turns back by chance."""
+    @cached_property
+    def command_p(self) -> float:
+        """Return p of the largest evidence of what the command gives, where runs are moved in time.
+
+        Few strong stretches have few signs to flip, yet do not stand where the robot turns back by chance.
+        Of its root, which is as an amplitude: the evidence itself has a longer tail than Gumbel's.
+        """
+        nats = max((each.unbounded for each in self.evidences if each.on in _COMMANDED), default=0.0)
+        # of less a sound robot may have as much where its force is
+        if nats < _LIMITS.certain_evidence:
+            return 1.0
+        return _tail_p(np.sqrt(np.maximum(self.moved(), 0.0)), nats**0.5)
 
     def p_of(self, evidence: Evidence) -> float:
         """Return the same of one of its evidences."""
@@ -73,7 +86,10 @@ def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> lis
     for place in grid.places:
         for own, evidences in zip(found, _searched(rows, views, place, signs), strict=True):
             _add(own, evidences)
-    return [_study(view, own) for view, own in zip(views, found, strict=True)]
+    return [
+        _study(view, own, functools.partial(_moved, rows, view, grid))
+        for view, own in zip(views, found, strict=True)
+    ]
 
 
 def _searched(
@@ -102,7 +118,7 @@ def _signs(view: View, seed: int) -> Floats:
     return signs
 
 
-def _study(view: View, found: Sequence[Evidence]) -> Study:
+def _study(view: View, found: Sequence[Evidence], moved: Callable[[], Floats]) -> Study:
     """Return the study: one evidence for each place and input, and p of the largest."""
     best: dict[object, Evidence] = {}
     for each in sorted(found, key=lambda evidence: -evidence.nats):
@@ -115,7 +131,7 @@ def _study(view: View, found: Sequence[Evidence]) -> Study:
         simplest_first(best.values()),
         _p(found, nats),
         _tail_p(_largest(found), nats),
-        command_p(found),
+        moved,
     )
 
 
@@ -131,18 +147,15 @@ def _p(found: Sequence[Evidence], nats: float) -> float:
     return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))
 
 
-def command_p(found: Sequence[Evidence]) -> float:
-    """Return p of the largest evidence of what the command gives, where runs are moved in time; 1 of joints.
-
-    Of its root, which is as an amplitude: the evidence itself has a longer tail than Gumbel's.
-    """
-    given = [each for each in found if each.on in _COMMANDED]
-    nats = max((each.unbounded for each in given), default=0.0)
-    # of less a sound robot may have as much where its force is
-    if nats < _LIMITS.certain_evidence or not len(given[0].moved):
-        return 1.0
-    moved = np.max(np.stack([each.moved for each in given]), axis=0)
-    return _tail_p(np.sqrt(np.maximum(moved, 0.0)), nats**0.5)
+def _moved(rows: Rows, view: View, grid: Grid) -> Floats:
+    """Return the largest evidence (moves,) of what the command gives, where runs are moved in time."""
+    largest = np.full(_LIMITS.moves, -np.inf)
+    for family in grid.families():
+        if family.on in _COMMANDED:
+            columns = Columns(rows.of(family.columns, family.place.component))
+            at = view.at(family.place.component)
+            largest = np.maximum(largest, moved_evidence(at, columns, family.roots))
+    return largest
 
 
 def _tail_p(random: Floats, nats: float) -> float:

@@ -38,17 +38,14 @@ class View:
     """(v,) the component of each block."""
     runs: Ints
     """(v,) the number of the run of each block."""
-    moves: int = 0
-    """Of the residual in time; none of joints, whose models are off where they accelerate hard."""
     kept: tuple[int, ...] | None = None
     """Which of the link's nuisance are in N; None: all."""
 
     @classmethod
     def of(cls, rows: Rows, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> "View":
         """Return the view of residuals (n, k) with tangents (k, n, t) of the effects in the model."""
-        moves = 0 if rows.traces[0].link.of_joints else THRESHOLDS.families.moves
         left = rows.of([each.T[:, :, None] for each in residuals])[:, 0]
-        return cls(left, rows.of(tangents), rows.nuisance, rows.members, rows.components, rows.runs, moves)
+        return cls(left, rows.of(tangents), rows.nuisance, rows.members, rows.components, rows.runs)
 
     def beside(self, residual: Floats, tangents: Floats) -> "View":
         """Return the view of the same rows with another residual (v,) and other tangents (v, t)."""
@@ -90,7 +87,6 @@ class View:
             self.members[:, np.flatnonzero(rows)],
             self.components[rows],
             self.runs[rows],
-            self.moves,
             tuple(np.flatnonzero(columns[t:]).tolist()),
         )
 
@@ -182,9 +178,10 @@ class View:
         """
         generator = np.random.default_rng(0)
         runs = int(self.runs.max(initial=0)) + 1
-        shares = generator.uniform(*_MOVED_BY, (self.moves, runs))
-        signs = np.where(generator.random((self.moves, runs)) < 0.5, -1.0, 1.0)
-        moved = np.empty((self.moves, len(self.projected)))
+        moves = THRESHOLDS.families.moves
+        shares = generator.uniform(*_MOVED_BY, (moves, runs))
+        signs = np.where(generator.random((moves, runs)) < 0.5, -1.0, 1.0)
+        moved = np.empty((moves, len(self.projected)))
         begins = np.flatnonzero(np.diff(self.runs, prepend=-1) | np.diff(self.components, prepend=-1))
         for first, last in zip(begins, [*begins[1:], len(self.runs)], strict=True):
             rest, run = self.projected[first:last], self.runs[first]

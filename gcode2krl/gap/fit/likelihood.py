@@ -37,9 +37,11 @@ class Likelihood:
     ) -> None:
         self.traces, self.noise = tuple(traces), tuple(noise)
         self.design = NuisanceDesign.of(nuisance)
+        self._sure = [_sure(trace, own, self.noise) for trace, own in zip(self.traces, nuisance, strict=True)]
+        """(k, n) of each trace"""
         self.whitened_nuisance = [
             [
-                self._used(trace, j, own, self.design.places[number])
+                self._used(number, j, own, self.design.places[number])
                 for j, own in enumerate(self.design.columns(number, trace))
             ]
             for number, trace in enumerate(self.traces)
@@ -58,18 +60,20 @@ class Likelihood:
 
     # Data and models as vectors
 
-    def _whitened(self, trace: Trace, columns: Floats) -> Floats:
+    def white(self, number: int, component: int, columns: Floats) -> Floats:
+        """Return L⁻¹ times columns (n, c) of a component of a trace, by its number."""
+        white = self.noise[component].whiten(columns, self.traces[number].segments)
+        sure = self._sure[number]
+        return white if sure is None else white * sure[component, :, None]
+
+    def _whitened(self, number: int, columns: Floats) -> Floats:
         """Return L⁻¹ times columns (k, n, c) of a trace, (k·n, c)."""
-        return np.concatenate(
-            [noise.whiten(own, trace.segments) for noise, own in zip(self.noise, columns, strict=True)]
-        )
+        return np.concatenate([self.white(number, j, own) for j, own in enumerate(columns)])
 
     def whiten(self, values: Sequence[Floats]) -> Floats:
         """Return L⁻¹ times values (n, k) of all traces, (v,)."""
         columns = [value.T[:, :, None] for value in values]
-        return np.concatenate(
-            [self._whitened(trace, own)[:, 0] for trace, own in zip(self.traces, columns, strict=True)]
-        )
+        return np.concatenate([self._whitened(number, own)[:, 0] for number, own in enumerate(columns)])
 
     @cached_property
     def clusters(self) -> Ints:
@@ -81,12 +85,10 @@ class Likelihood:
         ends = np.cumsum([trace.measured.size for trace in self.traces])
         return np.split(vectors, ends[:-1])
 
-    def _used(self, trace: Trace, component: int, columns: Floats, places: Ints) -> UsedColumns:
+    def _used(self, number: int, component: int, columns: Floats, places: Ints) -> UsedColumns:
         """Return the columns (n, c) of a component that are not zero, whitened, and their places of (c,)."""
         used = np.flatnonzero(columns.any(axis=0))
-        return UsedColumns(
-            self.noise[component].whiten(columns[:, used], trace.segments), np.asarray(places)[used]
-        )
+        return UsedColumns(self.white(number, component, columns[:, used]), np.asarray(places)[used])
 
     # Nuisance
 
@@ -191,7 +193,7 @@ class Likelihood:
 
             steps = numbers.box.steps(x, STEP_SHARE)
             return derivative(residual, x, residual(x), steps) * numbers.box.scale
-        slopes = [self._whitened(*pair) for pair in zip(self.traces, self.tangents(numbers, x), strict=True)]
+        slopes = [self._whitened(number, own) for number, own in enumerate(self.tangents(numbers, x))]
         return self.projected(-np.concatenate(slopes), numbers.applied(x))
 
     def scores(self, jacobian: Floats, residual: Floats) -> Floats:
@@ -203,8 +205,8 @@ class Likelihood:
         """Return the fast view of signatures (k, n, s) of each trace."""
         width = signatures[0].shape[2]
         columns = [
-            [self._used(trace, j, values, np.arange(width)) for j, values in enumerate(own)]
-            for trace, own in zip(self.traces, signatures, strict=True)
+            [self._used(number, j, values, np.arange(width)) for j, values in enumerate(own)]
+            for number, own in enumerate(signatures)
         ]
         stretches = [stretches_of(trace) for trace in self.traces]
         return SignatureGram(columns, self.whitened_nuisance, width, self.design.places, stretches)
@@ -213,9 +215,20 @@ class Likelihood:
         """Return whitened [r, T] (k·n, 1 + t) of each trace with some effects, for `SignatureGram.beside`."""
         residuals = [(trace.measured - trace.sample(applied)).T[:, :, None] for trace in self.traces]
         return [
-            self._whitened(trace, np.concatenate([r, t], axis=2))
-            for trace, r, t in zip(self.traces, residuals, tangents, strict=True)
+            self._whitened(number, np.concatenate([r, t], axis=2))
+            for number, (r, t) in enumerate(zip(residuals, tangents, strict=True))
         ]
+
+
+def _sure(trace: Trace, nuisance: Sequence[Nuisance], noise: Sequence[Noise]) -> Floats | None:
+    """Return what a row counts (k, n) beside what nuisance misses of it; None where that is nothing."""
+    missed = [each.missed for each in nuisance if each.missed is not None]
+    if not missed:
+        return None
+    sigma = np.array([each.short_sigma for each in noise])
+    beyond = np.sum(np.square(missed), axis=0) / sigma**2
+    sure: Floats = np.ascontiguousarray((1.0 + beyond).T ** -0.5)
+    return sure if np.any(beyond) else None
 
 
 def _kept_normal(kept: Floats, normal: Floats) -> Floats:

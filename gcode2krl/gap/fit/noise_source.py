@@ -8,6 +8,7 @@ from scipy.sparse import csc_array, identity
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
+from gcode2krl.effects.effect import JOINTS
 from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
@@ -31,6 +32,8 @@ _LEVEL_S, _LEVELS = 0.1, 5
 """Blocks whose medians are the level of a residual, and how many before and after."""
 _FAR = 8.0
 """Robust deviations from it beyond which a row is of an event: heavy tails hardly go there."""
+_ALIKE_SHARE = 0.5
+"""Of six encoders, which must wander for that to be their noise."""
 _SAME_MM = 1e-3
 _SAME_RAD = 1e-3
 """Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
@@ -61,6 +64,8 @@ def noise_of(
     slow = [
         _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
     ]
+    if _in_few_joints(traces[0], slow):
+        slow = [()] * len(slow)
     generator = np.random.default_rng(0)
     slow_drawn = [
         [
@@ -76,10 +81,18 @@ def noise_of(
     ]
     again = source.noise(drawn, [_EXACT] * len(first), slow, slow_drawn)
     most = _LIMITS.noise_most_stated * min(stated, default=np.inf)
-    return [
+    learnt = [
         at_most(unbiased(noise, of_drawn, floor), most)
         for noise, of_drawn, floor in zip(first, again, floors, strict=True)
     ]
+    if _in_few_joints(traces[0], [each.beyond for each in learnt]):
+        return [replace(each, beyond=0.0) for each in learnt]
+    return learnt
+
+
+def _in_few_joints(trace: Trace, has: Sequence[object]) -> bool:
+    """Tell whether few of six encoders have something: they are alike, so that it is the joint's."""
+    return trace.components == JOINTS and sum(map(bool, has)) < _ALIKE_SHARE * len(has)
 
 
 def _spikes(trace: Trace, rest: Floats) -> Floats:

@@ -36,6 +36,8 @@ class Nuisance(NamedTuple):
     """Of which effect, target and shape it is the usual size; None for what only instruments have."""
     bent: bool = False
     """It is what the effect does beyond the first order of its size."""
+    missed: Floats | None = None
+    """(n, k) standard deviation of what its columns do not have."""
 
 
 def nuisance_of(
@@ -56,7 +58,9 @@ def nuisance_of(
         *_of_effects(trace, library, mismatch, known, upstream, joints),
         *_of_instruments(trace, library, mismatch, upstream, clock),
     ]
-    return [nuisance for nuisance in every if np.any(nuisance.columns)]
+    return [
+        each for each in every if np.any(each.columns) or (each.missed is not None and np.any(each.missed))
+    ]
 
 
 # Effects at their usual size, one value for all runs
@@ -132,6 +136,9 @@ def _of_instruments(
         yield Nuisance(name, False, columns)
     effect = next((each for each in library.values() if each.is_clock), None)
     block = None if effect is None else Block(effect, trace.link.clock)
-    yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock, block)
+    # within the clock's deviation of a kink, and between two samples, either rate may hold
+    sample_s = float(np.median(np.diff(trace.inputs.time_s))) if len(trace.inputs.time_s) > 1 else 0.0
+    unsure_s = 0.5 * np.hypot(sigma(mismatch.clock_s) * clock, sigma(sample_s / 2.0))
+    yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock, block, missed=trace.kinks * unsure_s)
     if trace.link.has_time_law(upstream):
         yield Nuisance("time law", False, time_law_columns(trace, mismatch))

@@ -88,6 +88,9 @@ class ChooseThresholds:
     )
     model_off_rows: int = convention(3, "such moments of all runs: fewer are bad rows of a log")
     loud_p: float = convention(1e-3, "chance that so many loud events fall where the command changes")
+    rough_joint: float = convention(
+        0.5, "of its noise's power, what one joint has more than most: heavy tails of 1,000 rows have a fifth"
+    )
     loud_share: float = calibrated(
         0.25,
         range(20_000, 21_000),
