@@ -181,9 +181,11 @@ def test_a_gap_is_rare_or_beyond_what_models_are_off_by_however_small_beside_the
     nats, inflation, tail_p, known, own_time, in_one, wanted
 ):
     place = c.stub(component=None)
-    said = c.stub(nats=nats, gain=2.0 * nats, in_one=in_one, inflation=inflation, place=place)
+    said = c.stub(nats=nats, unbounded=0.0, gain=2.0 * nats, in_one=in_one, inflation=inflation, place=place)
     evidence = c.stub(**vars(said), on=Dependence.VELOCITY)
-    slow = c.stub(nats=own_time, gain=0.0, in_one=0.0, inflation=1.0, on=Dependence.RUN_TIME, place=place)
+    slow = c.stub(
+        nats=own_time, unbounded=0.0, gain=0.0, in_one=0.0, inflation=1.0, on=Dependence.RUN_TIME, place=place
+    )
     for gap_gain, upstream_gain in ((known, 0.0), (0.0, known)):
         rest = Rest(Study(1e9, (evidence, slow), 0.005, tail_p), gap_gain, upstream_gain=upstream_gain)
         assert rest.is_gap is wanted

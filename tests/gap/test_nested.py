@@ -18,7 +18,6 @@ def evidence(on, nats, place="tip"):
         inflation=1.0,
         flipped=np.zeros(1),
         unbounded=nats,
-        moved=np.zeros(0),
         signal=(),
     )
 

@@ -42,6 +42,7 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
         link.clock_share(context),
         context.seed,
         context.joints,
+        any(each.verdict == "unexplained" and not each.link.tells_time for each in context.judgements),
     )
 
 

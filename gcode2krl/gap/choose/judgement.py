@@ -9,7 +9,7 @@ from gcode2krl.effects import Applied
 from gcode2krl.gap.beside.holdout import folds_of
 from gcode2krl.gap.beside.links.base import Link
 from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.calibrated import probabilities_table
+from gcode2krl.gap.choose.calibrated import MOST_UNNAMED, probabilities_table
 from gcode2krl.gap.choose.constancy import constancy_of
 from gcode2krl.gap.choose.examination import Examination, Key
 from gcode2krl.gap.choose.family_tests import NOTHING_LEFT, LinkFamilies, Rest
@@ -26,6 +26,8 @@ from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
+_SURE = 2.0
+"""Standard deviations of what is left."""
 _LEAST_REST = 1e-6
 """Of the gap: nobody takes a share of less."""
 
@@ -226,7 +228,9 @@ def _judgement(
     # what is left on held-out data alone is what few runs do not settle of a cause's numbers
     left = last.significant and whole.significant
     every = replace(families.rest, is_sized=left)
-    told = _causes(found, sizes, families, every, trials, rivals)
+    told = list(_causes(found, sizes, families, every, trials, rivals))
+    if found.question.behind_unknown or _leave_much(found, told, sizes, trials):
+        told = [_unnamed(cause) for cause in told]
     causes = sorted(told, key=lambda cause: -cause.probability)
     named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = left if named else sizes[0].significant
@@ -237,6 +241,24 @@ def _judgement(
         is_gap = not is_wander(found, families.traces, rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
     return _of(found, verdict, tuple(causes), last, rest, held_out=bool(trials))
+
+
+def _leave_much(
+    found: Examination, told: Sequence[Cause], sizes: Sequence[Size], trials: Sequence["_Trial"]
+) -> bool:
+    """Tell whether the named causes leave a large share of the gap on data not used: then they are not it."""
+    named = [cause.applied for cause in told if cause.probability >= NAMED]
+    if not named or not trials or found.link.model_rms:
+        return False
+    size = sizes[-1] if len(named) == len(told) else pooled([trial.size_with(named) for trial in trials])
+    return size.share_left > _LIMITS.named_left and size.excess > _SURE * size.deviation
+
+
+def _unnamed(cause: Cause) -> Cause:
+    """Return a cause without a name, but for one that plans the motion anew: all links show that one."""
+    if cause.applied.effect.plans_anew:
+        return cause
+    return replace(cause, probability=min(cause.probability, MOST_UNNAMED))
 
 
 def _is_gap(found: Examination, size: Size, rest: Rest) -> bool:

@@ -30,6 +30,8 @@ class Question:
     seed: int = 0
     joints: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Link of joints -> those that it has data of."""
+    behind_unknown: bool = False
+    """A measured link before it has a gap without a name, which may show here too."""
 
 
 def nuisance_for(traces: Sequence[Trace], question: Question, known: Signatures) -> list[list[Nuisance]]:
