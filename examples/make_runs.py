@@ -32,7 +32,8 @@ SLOW_s = 0.048
 
 def main() -> None:
     """Write run-1, run-2 and run-3."""
-    prediction = predict(ROOT / PROGRAM, forces=False)
+    # a controller commands every millisecond; 12 ms would cut its corners
+    prediction = predict(ROOT / PROGRAM, dt_s=0.001, forces=False)
     track = Track(prediction.motion.time_s, prediction.joints.q_rad)
     rng = np.random.default_rng(SEED)
     far_below = np.array([[0.0, -70.0, -1030.0], [160.0, 70.0, -1000.0]])

@@ -28,6 +28,8 @@ class Signal:
     inputs = SimpleNamespace(cell=None, time_s=TIME_S)
     nominal = np.zeros((len(TIME_S), 1))
     rate = clock_rate = np.ones((len(TIME_S), 1))
+    kinks = np.zeros((len(TIME_S), 1))
+    inputs = SimpleNamespace(time_s=TIME_S)
 
     def __init__(self):
         self.simulated = 0

@@ -9,6 +9,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs, Signals, simulate
+from gcode2krl.effects.effect import JOINTS
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.beside.interpolation import (
     LastPath,
@@ -167,6 +168,11 @@ class Trace:
     def unit(self) -> str:
         """Return the unit of the report."""
         return self.link.unit
+
+    @property
+    def of_six_encoders(self) -> bool:
+        """Tell whether it is of two columns of all joints, whose encoders are alike."""
+        return self.link.of_joints and self.minus is not None and self.measured.shape[1] == len(JOINTS)
 
     @property
     def shape(self) -> tuple[int, int]:

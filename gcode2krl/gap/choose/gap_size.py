@@ -179,7 +179,7 @@ def _rough_joint(likelihood: Likelihood, left: Sequence[Floats]) -> float:
 
     Six encoders are alike: what is loud in few of them, for moments too, is no noise.
     """
-    if likelihood.traces[0].components != JOINTS:
+    if not likelihood.traces[0].of_six_encoders:
         return 0.0
     power = np.array(
         [

@@ -8,7 +8,6 @@ from scipy.sparse import csc_array, identity
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.effects.effect import JOINTS
 from gcode2krl.gap.beside.decimals import resolution, usual_deviation
 from gcode2krl.gap.beside.interpolation import nearest_rows
 from gcode2krl.gap.beside.trace import Trace
@@ -92,7 +91,7 @@ def noise_of(
 
 def _in_few_joints(trace: Trace, has: Sequence[object]) -> bool:
     """Tell whether few of six encoders have something: they are alike, so that it is the joint's."""
-    return trace.components == JOINTS and sum(map(bool, has)) < _ALIKE_SHARE * len(has)
+    return trace.of_six_encoders and sum(map(bool, has)) < _ALIKE_SHARE * len(has)
 
 
 def _spikes(trace: Trace, rest: Floats) -> Floats:
