@@ -29,7 +29,7 @@ class Signal:
     nominal = np.zeros((len(TIME_S), 1))
     rate = clock_rate = np.ones((len(TIME_S), 1))
     kinks = np.zeros((len(TIME_S), 1))
-    inputs = SimpleNamespace(time_s=TIME_S)
+    inputs = SimpleNamespace(time_s=TIME_S, cell=None)
 
     def __init__(self):
         self.simulated = 0

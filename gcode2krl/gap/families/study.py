@@ -63,9 +63,8 @@ class Study:
         """
         nats = max((each.unbounded for each in self.evidences if each.on in _COMMANDED), default=0.0)
         # of less a sound robot may have as much where its force is
-        if nats < _LIMITS.certain_evidence:
-            return 1.0
-        return _tail_p(np.sqrt(np.maximum(self.moved(), 0.0)), nats**0.5)
+        moved = self.moved() if nats >= _LIMITS.certain_evidence else np.zeros(0)
+        return _tail_p(np.sqrt(np.maximum(moved, 0.0)), nats**0.5) if len(moved) else 1.0
 
     def p_of(self, evidence: Evidence) -> float:
         """Return the same of one of its evidences."""
@@ -148,7 +147,12 @@ def _p(found: Sequence[Evidence], nats: float) -> float:
 
 
 def _moved(rows: Rows, view: View, grid: Grid) -> Floats:
-    """Return the largest evidence (moves,) of what the command gives, where runs are moved in time."""
+    """Return the largest evidence (moves,) of what the command gives, where runs are moved in time.
+
+    None of joints beside a plan, whose corners are off by more than noise.
+    """
+    if rows.traces[0].link.of_joints and not rows.traces[0].of_six_encoders:
+        return np.zeros(0)
     largest = np.full(_LIMITS.moves, -np.inf)
     for family in grid.families():
         if family.on in _COMMANDED:
