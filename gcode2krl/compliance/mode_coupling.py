@@ -34,6 +34,12 @@ MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
 _LEAST_GAIN, _STEP = 1.0 / 16.0, math.sqrt(2.0)
 _HALVINGS = 7
+_ONE, _TWO = np.array([1, 2, 0]), np.array([2, 0, 1])
+_MINORS = [
+    (rows[None, :], columns[:, None])
+    for rows, columns in ((_ONE, _ONE), (_TWO, _TWO), (_ONE, _TWO), (_TWO, _ONE))
+]
+"""The numbers of a 3x3 matrix of which the minors of its transpose are made."""
 _LOAD_N = 1.0
 _LEAST_MM_N = 1e-12
 """Flexibility of a rigid arm, so that it has a stiffness."""
@@ -127,6 +133,6 @@ def _det(matrix: Floats, adjugate: Floats) -> Floats:
 
 
 def _adjugate(matrix: Floats) -> Floats:
-    """Return the adjugates of matrices (n, 3, 3): the rows' cross products as columns."""
-    a, b, c = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+    """Return the adjugates of matrices (n, 3, 3)."""
+    a, b, c, d = (matrix[:, rows, columns] for rows, columns in _MINORS)
+    return a * b - c * d
