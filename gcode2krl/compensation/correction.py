@@ -13,6 +13,7 @@ import numpy as np
 
 from gcode2krl import compliance
 from gcode2krl.arrays import Bools, Floats, Rows
+from gcode2krl.cell import Cell
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Evaluated, Placed, Ways
 
 SETTLED_MM = 1e-3
@@ -51,24 +52,50 @@ class Shift:
 
 
 class Contact(NamedTuple):
-    """Where the intended path is in air, up to the first loaded sample and from the last one.
+    """Places on the intended path with their forces; in air up to the first loaded one and from the last one.
 
-    Kept for all rounds: the intended path says where the tool is to cut.
+    Kept for all rounds: the intended path says where the tool is to cut. Every round bends at these places.
+    Its own samples move with the time law, and beside a step of the force the correction would then depend
+    on which side of it a sample happens to be.
     """
 
     path_mm: Floats
     """(k,) rising places."""
+    row: Rows
+    """(k,) row of Targets whose line each is on."""
+    corner: Bools
+    """(k,) True in an approximated corner."""
     air_mm: Floats
     """(k,) distance to the nearest place in air."""
+    force_base_N: Floats
+    """(k, 3) force on the tool."""
+    moment_base_Nmm: Floats
+    """(k, 3) its moment about the tip."""
 
     @classmethod
     def of(cls, ways: Ways, evaluated: Evaluated) -> "Contact":
         """Return the contact of the intended targets as evaluated."""
         motion, _, forces, _ = evaluated
-        path_mm, sample = ways.place(motion).distinct()
+        placed = ways.place(motion)
+        path_mm, sample = placed.distinct()
         air: Bools = np.append(False, ~np.asarray(forces.force_base_N[sample].any(axis=1)))
         near_air = air | np.roll(air, 1) | np.roll(air, -1)  # contact begins somewhere between two samples
-        return cls(path_mm, _distance(path_mm, near_air[1:]))
+        return cls(
+            path_mm,
+            placed.row[sample],
+            motion.corner[sample],
+            _distance(path_mm, near_air[1:]),
+            forces.force_base_N[sample],
+            forces.moment_base_Nmm[sample],
+        )
+
+    def against(self, placed: Placed, evaluated: Evaluated, cell: Cell) -> Floats:
+        """Return minus the deflection (k, 3) at the places, with the arm as at the nearest sample."""
+        path_mm, sample = placed.distinct()
+        near = sample[np.searchsorted((path_mm[1:] + path_mm[:-1]) / 2.0, self.path_mm)]
+        motion, joints = evaluated[:2]
+        load = (self.force_base_N, self.moment_base_Nmm, np.zeros(3), cell, motion.tool[near])
+        return -compliance.deflection_of(joints.q_rad[near], *load)[0]
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""
@@ -94,8 +121,8 @@ class LineRun:
     value_mm: Floats
     air_mm: Floats
     """(n,) distance to the nearest place in air."""
-    sample: Rows
-    """(n,) sample of the Motion, -1 where there is none."""
+    place: Rows
+    """(n,) place of the Contact, -1 where there is none."""
     slope: float = MOST_SLOPE
     asked_mm: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     """(n, 3) the values before they were ramped."""
@@ -108,29 +135,34 @@ class LineRun:
 
 
 def wanted_correction(
-    ways: Ways, evaluated: Evaluated, contact: Contact, before: Shift, tolerance_mm: float, divides: bool
+    ways: Ways,
+    evaluated: Evaluated,
+    contact: Contact,
+    cell: Cell,
+    before: Shift,
+    tolerance_mm: float,
+    divides: bool,
 ) -> Field:
-    """Return the shift that a deflection asks for.
+    """Return the shift that the deflection of the arm as evaluated asks for.
 
     Lines stay divided where ``before`` divides them; with ``divides`` they are also divided where the
     correction differs from a straight line by more than half of ``tolerance_mm``.
     """
-    motion, _, _, deflection = evaluated
-    placed = ways.place(motion, before.target_mm)
-    path_mm, sample = placed.distinct()
+    placed = ways.place(evaluated[0], before.target_mm)
     divided = ways.begin_mm[before.row] + before.along_mm
-    known = (path_mm, -deflection.deflection_base_mm[sample], sample, motion.corner[sample], contact, divided)
-    runs = [_run(ways, first, last, *known) for first, last in ways.runs()] if len(path_mm) else []
+    runs = []
+    if len(contact.path_mm):
+        against = contact.against(placed, evaluated, cell)
+        runs = [_run(ways, first, last, against, contact, divided) for first, last in ways.runs()]
     target_mm = _corners(ways, runs)
-    ramped = placed.row >= 0
+    ramped = np.ones(len(contact.path_mm), dtype=np.bool_)
     rows, alongs, pieces = [before.row[:0]], [before.along_mm[:0]], [before.piece_mm[:0]]
     for run in runs:
         _tie(run, ways, target_mm)
-        sampled = run.sample >= 0
-        off = compliance.project_normal(
-            (run.value_mm - run.asked_mm)[sampled], ways.unit[placed.row[run.sample[sampled]]]
-        )
-        ramped[run.sample[sampled]] = np.linalg.norm(off, axis=1) > SETTLED_MM
+        place = run.place[run.place >= 0]
+        off = (run.value_mm - run.asked_mm)[run.place >= 0]
+        off = compliance.project_normal(off, ways.unit[contact.row[place]])
+        ramped[place] = np.linalg.norm(off, axis=1) > SETTLED_MM
         inner = np.arange(run.first, run.last)
         value = interpolated(ways.end_mm[inner], run.path_mm, run.value_mm)
         target_mm[inner] = _on_curve(ways, inner, value, tolerance_mm)
@@ -145,13 +177,15 @@ def wanted_correction(
     row_of, along_mm = np.concatenate(rows), np.concatenate(alongs)
     stretch_mm = _stretch(ways, target_mm, row_of, along_mm)
     shift = Shift(target_mm, row_of, along_mm, np.concatenate(pieces) + stretch_mm)
-    return Field(shift, placed, _with_neighbours(ways, placed, ramped))
+    return Field(shift, placed, _near_ramps(ways, placed, contact, ramped))
 
 
-def _with_neighbours(ways: Ways, placed: Placed, ramped: Bools) -> Bools:
+def _near_ramps(ways: Ways, placed: Placed, contact: Contact, ramped: Bools) -> Bools:
     """Return the samples (m,) within two pieces of a ramp: no line can follow its kinks more closely."""
-    near = _distance(placed.path_mm, ramped) <= 2.0 * ways.piece_mm[placed.row]
-    return np.asarray(near & (placed.row >= 0))
+    if not ramped.any():
+        return np.zeros(len(placed.row), dtype=np.bool_)
+    away_mm = np.interp(placed.path_mm, contact.path_mm, _distance(contact.path_mm, ramped))
+    return np.asarray((away_mm <= 2.0 * ways.piece_mm[placed.row]) & (placed.row >= 0))
 
 
 def _stretch(ways: Ways, target_mm: Floats, row: Rows, along_mm: Floats) -> Floats:
@@ -161,21 +195,13 @@ def _stretch(ways: Ways, target_mm: Floats, row: Rows, along_mm: Floats) -> Floa
     return np.asarray((head[row] + fraction * (tail - head)[row])[:, None] * ways.unit[row])
 
 
-def _run(
-    ways: Ways,
-    first: int,
-    last: int,
-    path_mm: Floats,
-    against: Floats,
-    sample: Rows,
-    corner: Bools,
-    contact: Contact,
-    divided_mm: Floats,
-) -> LineRun:
-    """Return minus the deflection along a run and at its ends, without the samples in the corners there.
+def _run(ways: Ways, first: int, last: int, against: Floats, contact: Contact, divided_mm: Floats) -> LineRun:
+    """Return minus the deflection along a run and at its ends, without the places in the corners there.
 
-    There are values at the samples, at the targets, and at ``divided_mm``, where lines are divided already.
+    There are values at the places of the contact, at the targets, and at ``divided_mm``, where lines are
+    divided already.
     """
+    path_mm, corner = contact.path_mm, contact.corner
     begin, end = ways.begin_mm[first], ways.end_mm[last]
     low, high = np.searchsorted(path_mm, [begin, end])
     high = high + int(high < len(path_mm) and path_mm[high] == end)
@@ -184,7 +210,7 @@ def _run(
     keep = ~(corner[low:high] & ((at - begin < head) | (end - at < ways.blend_mm[last])))
     keep &= (at > begin) & (at < end)
     rows = low + np.flatnonzero(keep)
-    if len(rows) == 0:  # shorter than a sample: the correction of its neighbour
+    if len(rows) == 0:  # without a place: the correction of its neighbour
         near = min(low, len(path_mm) - 1)
         places, ends = np.array([begin, end]), np.repeat(against[near : near + 1], 2, axis=0)
         run = LineRun(first, last, places, ends, contact.air_at(places), np.array([-1, -1]))
@@ -197,8 +223,8 @@ def _run(
     more = ways.end_mm[first:last]
     more = np.concatenate([more, divided_mm[slice(*np.searchsorted(divided_mm, [begin, end]))]])
     every, of = np.unique(np.concatenate([places, more]), return_index=True)
-    samples = np.concatenate([[-1], sample[rows], [-1], np.full(len(more), -1)])[of]
-    run = LineRun(first, last, every, interpolated(every, places, value), contact.air_at(every), samples)
+    place = np.concatenate([[-1], rows, [-1], np.full(len(more), -1)])[of]
+    run = LineRun(first, last, every, interpolated(every, places, value), contact.air_at(every), place)
     run.ramp(float(ways.slope[first : last + 1].min()))
     return run
 

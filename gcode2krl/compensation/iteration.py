@@ -24,8 +24,6 @@ from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.pipeline import plan_motion
 from gcode2krl.tables import Deflection, Forces, Motion, Targets, Toolpath
 
-Evaluate = Callable[[Targets], Evaluated]
-
 MOST_BAND = 0.5
 """Half-width of the 90 % band over the deflection above which a correction may do more harm than good."""
 MOST_CORRECTION_MM = 10.0
@@ -53,19 +51,26 @@ class Compensated:
 
 
 def compensate(
-    toolpath: Toolpath, targets: Targets, cell: Cell, evaluate: Evaluate, *, tolerance_mm: float = 0.01
+    toolpath: Toolpath,
+    targets: Targets,
+    cell: Cell,
+    motion: Motion,
+    forces: Forces,
+    *,
+    tolerance_mm: float = 0.01,
 ) -> Compensated:
     """Return targets moved by the correction, found in rounds until they change by less than 1 µm.
 
-    Assumption: the deflection is a function of the place on the path; it may depend on the correction itself
-    as long as it grows more slowly than the correction. Rapids, approaches and moves in air are not touched.
+    Forces stay at their places on the path: right to first order where the correction succeeds, because the
+    tool then cuts what was intended. The reach and with it the deflection are those of the moved targets.
+    Rapids, approaches and moves in air are not touched.
     Where the correction jumps (contact, a change of engagement) it is ramped with the slope that speed,
     acceleration and approximation allow, at most `MOST_SLOPE`.
 
     Parameters
     ----------
     targets : those of `pipeline.set_targets`, the path that the tool shall cut.
-    evaluate : targets → Motion, Joints, Forces and Deflection of them; `keeping_forces` is one.
+    motion, forces : those of ``targets``.
     tolerance_mm : how far a line may be from the correction between its ends before it is divided.
 
     Raises
@@ -79,16 +84,18 @@ def compensate(
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive", "0.01 is usual")
     ways = Ways.of(toolpath, targets, cell)
+    evaluate = _keeping_forces(ways, targets, motion, forces, cell)
     first = evaluate(targets)
     refuse_unsure(first[3], cell)
     contact = Contact.of(ways, first)
-    field = before = wanted_correction(ways, first, contact, Shift.none(ways), tolerance_mm, True)
+    field = before = wanted_correction(ways, first, contact, cell, Shift.none(ways), tolerance_mm, True)
     for rounds in range(1, _MOST_ROUNDS + 1):
         shift = field.shift
         _refuse_large(shift.largest_mm(), targets.source)
         plain, moved = _with_rows(targets, ways, shift, cell)
         evaluated = evaluate(moved)
-        field = wanted_correction(ways, evaluated, contact, shift, tolerance_mm, rounds < _DIVIDING_ROUNDS)
+        divides = rounds < _DIVIDING_ROUNDS
+        field = wanted_correction(ways, evaluated, contact, cell, shift, tolerance_mm, divides)
         change_mm = field.shift.change_mm(shift)
         if change_mm <= SETTLED_MM:
             break
@@ -142,15 +149,10 @@ def refuse_twice(online: bool, both: bool) -> None:
         raise RefusedError(Issue("error", "compensation-twice", 0, sentence, remedy))
 
 
-def keeping_forces(
-    toolpath: Toolpath, targets: Targets, motion: Motion, forces: Forces, cell: Cell
-) -> Evaluate:
-    """Return an ``evaluate`` that keeps the forces of the intended path, place by place.
-
-    Right to first order where the correction succeeds, because the tool then cuts what was intended. Reach
-    and stiffness are those of the moved targets. ``motion`` and ``forces`` belong to ``targets``.
-    """
-    ways = Ways.of(toolpath, targets, cell)
+def _keeping_forces(
+    ways: Ways, targets: Targets, motion: Motion, forces: Forces, cell: Cell
+) -> Callable[[Targets], Evaluated]:
+    """Return what evaluates moved targets with the forces of ``targets``, place by place."""
     known = ways.place(motion)
     path_mm, last = known.distinct()
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else cell.controller.cycle_s
@@ -223,9 +225,7 @@ def _refuse_large(largest_mm: float, source: str) -> None:
     if largest_mm <= MOST_CORRECTION_MM:
         return
     sentence = f"a correction of {largest_mm:.1f} mm is more than {MOST_CORRECTION_MM:g} mm"
-    remedy = (
-        "check stiffness and forces; where forces grow with the correction, keep those of the intended path"
-    )
+    remedy = "check stiffness and forces"
     raise RefusedError(Issue("error", "compensation-large", 0, sentence, remedy), source)
 
 
@@ -235,7 +235,7 @@ def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Iss
         return
     sentence = f"the targets still change by {change_mm:.4f} mm after {_MOST_ROUNDS} rounds"
     if change_mm > tolerance_mm:
-        remedy = "the forces grow with the correction: keep the forces, or take smaller cuts"
+        remedy = "the arm bends differently at every corrected place: take smaller cuts, or move the part"
         raise RefusedError(Issue("error", "compensation-unsettled", 0, sentence, remedy), source)
     yield Issue("warning", "compensation-unsettled", 0, sentence, "compare the residual with your tolerance")
 

@@ -34,6 +34,12 @@ MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
 _LEAST_GAIN, _STEP = 1.0 / 16.0, math.sqrt(2.0)
 _HALVINGS = 7
+_ONE, _TWO = np.array([1, 2, 0]), np.array([2, 0, 1])
+_MINORS = [
+    (rows[None, :], columns[:, None])
+    for rows, columns in ((_ONE, _ONE), (_TWO, _TWO), (_ONE, _TWO), (_TWO, _ONE))
+]
+"""The numbers of a 3x3 matrix of which the minors of its transpose are made."""
 _LOAD_N = 1.0
 _LEAST_MM_N = 1e-12
 """Flexibility of a rigid arm, so that it has a stiffness."""
@@ -65,7 +71,7 @@ def coupling_index(
     ----------
     stiffness_N_mm : (n, 3, 3) of the tip, symmetric and positive.
     process_N_mm : (n, 3, 3) change of the mean force on the tool by a displacement of its tip.
-    damping : ratio, that of each mode.
+    damping : ratio, that of each mode, above 0.
     most_gain : up to which an instability is looked for; an index below its inverse is 0.
     """
     finite = np.asarray(np.isfinite(stiffness_N_mm + process_N_mm).all(axis=(1, 2)))
@@ -76,11 +82,7 @@ def coupling_index(
     drag = 2.0 * damping * (modes * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ modes.transpose(0, 2, 1)
 
     def grows(rows: Ints, gain: Floats) -> Bools:
-        system = np.zeros((len(rows), 6, 6))
-        system[:, :3, 3:] = np.eye(3)
-        system[:, 3:, :3] = gain[:, None, None] * process[rows] - stiffness[rows]
-        system[:, 3:, 3:] = -drag[rows]
-        return np.asarray(np.linalg.eigvals(system).real.max(axis=1) > 1e-9)
+        return ~_dies_out(drag[rows], stiffness[rows] - gain[:, None, None] * process[rows])
 
     low, high = np.zeros(len(scale)), np.full(len(scale), np.inf)
     gain = _LEAST_GAIN
@@ -96,3 +98,41 @@ def coupling_index(
         unstable = grows(rows, middle)
         high[rows[unstable]], low[rows[~unstable]] = middle[unstable], middle[~unstable]
     return np.where(finite, np.where(found, 1.0 / np.where(found, high, 1.0), 0.0), np.nan)
+
+
+def _dies_out(drag: Floats, stiffness: Floats) -> Bools:
+    """Tell (n,) where all solutions of u'' + C·u' + A·u = 0 die out, for C, A (n, 3, 3).
+
+    Routh's array of det(s²·I + s·C + A), whose first column has no change of sign (Routh 1877). The
+    polynomial's coefficients are the mixed principal minors of C and A.
+    """
+    rows = np.zeros((7, len(drag)))
+    sums = np.trace(drag, axis1=1, axis2=2), np.trace(stiffness, axis1=1, axis2=2)
+    minors = [_adjugate(each) for each in (drag, stiffness)]
+    rows[0], rows[1] = 1.0, sums[0]
+    rows[2] = np.trace(minors[0], axis1=1, axis2=2) + sums[1]
+    rows[3] = _det(drag, minors[0]) + sums[0] * sums[1] - _along(drag, stiffness)
+    rows[4] = np.trace(minors[1], axis1=1, axis2=2) + _along(minors[0], stiffness)
+    rows[5], rows[6] = _along(minors[1], drag), _det(stiffness, minors[1])
+    nothing = np.zeros(len(drag))
+    upper, lower, stable = rows[::2], np.vstack([rows[1::2], nothing]), np.ones(len(drag), dtype=np.bool_)
+    for _ in range(6):
+        stable &= lower[0] > 0.0
+        ratio = upper[0] / np.where(stable, lower[0], 1.0)
+        upper, lower = lower, np.vstack([upper[1:] - ratio * lower[1:], nothing])
+    return stable
+
+
+def _along(a: Floats, b: Floats) -> Floats:
+    """Return the traces (n,) of products of matrices (n, 3, 3)."""
+    return np.asarray(np.einsum("nij,nji->n", a, b))
+
+
+def _det(matrix: Floats, adjugate: Floats) -> Floats:
+    return np.asarray(np.einsum("nj,nj->n", matrix[:, 0], adjugate[:, :, 0]))
+
+
+def _adjugate(matrix: Floats) -> Floats:
+    """Return the adjugates of matrices (n, 3, 3)."""
+    a, b, c, d = (matrix[:, rows, columns] for rows, columns in _MINORS)
+    return a * b - c * d

@@ -19,7 +19,6 @@ from gcode2krl.gcode import findings, machine, tool_table
 from gcode2krl.gcode import vocabulary as v
 from gcode2krl.gcode.columns import Columns
 from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of, with_cutter
-from gcode2krl.gcode.heidenhain import Translator
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
@@ -394,6 +393,8 @@ class _Interpreter:
     ) -> tuple[Iterator[tuple[int, bytes]], Dialect]:
         """Return a conversational program as the core reads it, in pieces, and its dialect with its
         variables."""
+        from gcode2krl.gcode.heidenhain import Translator  # few programs need its patterns
+
         text = b"".join(piece for _, piece in read_pieces)
         translator = Translator(text.decode("utf-8", "replace"))
         translated = translator.text().encode()

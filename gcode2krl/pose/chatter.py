@@ -75,9 +75,9 @@ def coupling_along(
     cut, moved, pose = rows_at(forces, rows), rows_at(motion, rows), q_rad[rows]
     process = stiffness_of_cut(cut, moved, toolpath, cell)
     turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)
-    over = [_turned(moved, pose, cut.tool, process, cell, float(turn)) for turn in turns]
+    over = _turned(moved, pose, cut.tool, process, cell, turns)
     index = coupling_index(tip_stiffness(pose, cell, cut.tool), process, most_gain=most_gain)
-    return Coupling(rows, index, turns, np.array(over).reshape(len(turns), len(rows)))
+    return Coupling(rows, index, turns, over)
 
 
 def index_band(forces: Forces, cell: Cell) -> float:
@@ -86,23 +86,27 @@ def index_band(forces: Forces, cell: Cell) -> float:
 
 
 def _turned(
-    motion: Motion, q_rad: Floats, tool: Ints32, process: Floats, cell: Cell, turn_rad: float
+    motion: Motion, q_rad: Floats, tool: Ints32, process: Floats, cell: Cell, turns_rad: Floats
 ) -> Floats:
-    """Return the index (n,) with the tool turned about its axis, in the branch nearest to ``q_rad``."""
-    half = turn_rad / 2.0
-    x, y, z, w = np.ascontiguousarray(motion.rotation).T
-    s, c = math.sin(half), math.cos(half)
+    """Return the index (s, n) with the tool turned about its axis, in the branch nearest to ``q_rad``."""
+    row = np.tile(np.arange(len(q_rad)), len(turns_rad))
+    index = np.full(len(row), np.nan)
+    if not len(row):
+        return index.reshape(len(turns_rad), len(q_rad))
+    half = np.repeat(turns_rad / 2.0, len(q_rad))
+    x, y, z, w = motion.rotation[row].T
+    s, c = np.sin(half), np.cos(half)
     rotation = np.stack([x * c + y * s, y * c - x * s, z * c + w * s, w * c - z * s], axis=1)
-    other = robot.inverse(motion.position_mm, rotation, cell, tool)
-    away = np.abs(np.angle(np.exp(1j * (other - q_rad[:, None]))))[:, :, :5].max(axis=2)
+    other = robot.inverse(motion.position_mm[row], rotation, cell, tool[row])
+    away = np.abs(np.angle(np.exp(1j * (other - q_rad[row][:, None]))))[:, :, :5].max(axis=2)
     nearest = np.argmin(np.where(np.isfinite(away), away, np.inf), axis=1)
-    chosen = other[np.arange(len(q_rad)), nearest]
+    chosen = other[np.arange(len(row)), nearest]
     reached = np.isfinite(chosen).all(axis=1)
     reached[reached] = robot.pose_margins(chosen[reached], cell)[0] >= 0.0
-    index = np.full(len(q_rad), np.nan)
     if reached.any():
-        index[reached] = coupling_index(tip_stiffness(chosen[reached], cell, tool[reached]), process[reached])
-    return index
+        at = row[reached]
+        index[reached] = coupling_index(tip_stiffness(chosen[reached], cell, tool[at]), process[at])
+    return index.reshape(len(turns_rad), len(q_rad))
 
 
 def usual_coupling(poses: Poses, direction: Floats, cell: Cell) -> Floats:

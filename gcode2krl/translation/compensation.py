@@ -28,7 +28,7 @@ def compensated(
         Where there is no deflection, or it is too uncertain to move a robot by it.
     """
     from gcode2krl.blockwise import plan_course
-    from gcode2krl.compensation.iteration import compensate, keeping_forces
+    from gcode2krl.compensation.iteration import compensate
 
     motion, forces, deflection = prediction.motion, prediction.forces, prediction.deflection
     if motion is None or forces is None or deflection is None:
@@ -42,9 +42,7 @@ def compensated(
             )
         )
     toolpath, cell = prediction.toolpath, prediction.cell
-    done = compensate(
-        toolpath, prediction.targets, cell, keeping_forces(toolpath, prediction.targets, motion, forces, cell)
-    )
+    done = compensate(toolpath, prediction.targets, cell, motion, forces)
     motion, joints, kept, bent = done.evaluated
     # forces and part are those of the intended path at equal places, and so are the findings on them
     forces, deflection = (

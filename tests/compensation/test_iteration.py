@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gcode2krl import compliance, robot, write_krl
 from gcode2krl.compensation.intended_path import MOST_SLOPE
-from gcode2krl.compensation.iteration import compensate, keeping_forces, refuse_twice
+from gcode2krl.compensation.iteration import compensate, refuse_twice
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.krl.read import read_krl
@@ -59,35 +59,37 @@ def jump(motion):
     return np.where(below(motion) & (motion.position_mm[:, :1] > 40.0), [0.0, 600.0, 0.0], 0.0)
 
 
-def standing_in(law, cell, band=0.3):
+def corrected(toolpath, targets, cell, law, band=0.3, **options):
+    """The compensation of targets whose forces are a function of the intended position."""
+    motion, forces, _ = stages(targets, cell, law, band)
+    return compensate(toolpath, targets, cell, motion, forces, **options)
+
+
+def stages(targets, cell, law, band=0.3):
     """The stages behind the targets, with forces that are a function of the commanded position."""
-
-    def evaluate(targets):
-        motion = plan_motion(targets, cell)
-        joints = robot.follow_motion(motion, cell)
-        rows = len(motion)
-        nothing = np.zeros(rows)
-        forces = Forces(
-            force_base_N=law(motion),
-            moment_base_Nmm=np.zeros((rows, 3)),
-            peak_N=nothing,
-            torque_Nmm=nothing,
-            a_p_mm=nothing,
-            a_e_mm=nothing,
-            phi_rad=np.zeros((rows, 2)),
-            tool=motion.tool,
-            relative_band=band,
-        )
-        return motion, joints, forces, compliance.deflect(joints, forces, cell)
-
-    return evaluate
+    motion = plan_motion(targets, cell)
+    joints = robot.follow_motion(motion, cell)
+    rows = len(motion)
+    nothing = np.zeros(rows)
+    forces = Forces(
+        force_base_N=law(motion),
+        moment_base_Nmm=np.zeros((rows, 3)),
+        peak_N=nothing,
+        torque_Nmm=nothing,
+        a_p_mm=nothing,
+        a_e_mm=nothing,
+        phi_rad=np.zeros((rows, 2)),
+        tool=motion.tool,
+        relative_band=band,
+    )
+    return motion, forces, compliance.deflect(joints, forces, cell)
 
 
 @pytest.mark.parametrize("law", [constant, everywhere, linear, quadratic, jump])
 @pytest.mark.parametrize("body", [LINE, RECTANGLE, CIRCLE])
 def test_bent_tool_runs_on_the_intended_path(cell, body, law):
     toolpath, targets = read(body, cell)
-    done = compensate(toolpath, targets, cell, standing_in(law, cell))
+    done = corrected(toolpath, targets, cell, law)
     assert done.before.max_mm > 0.4
     assert done.after.steady_max_mm < 0.005
     assert np.count_nonzero(done.after.steady) > 0.5 * np.count_nonzero(done.after.cuts)
@@ -98,7 +100,7 @@ def test_bent_tool_runs_on_the_intended_path(cell, body, law):
 def test_shift_is_minus_the_deflection_normal_to_the_feed(cell):
     """At the end of a line under a constant force, against eq. 10 computed here at the moved pose."""
     toolpath, targets = read(LINE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    done = corrected(toolpath, targets, cell, everywhere)
     row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
     q = solve_joints(done.targets, cell).q_rad[row]
     base = cell.base_matrix()[:3, :3]
@@ -109,9 +111,8 @@ def test_shift_is_minus_the_deflection_normal_to_the_feed(cell):
 
 def test_result_stays_when_it_is_evaluated_again(cell):
     toolpath, targets = read(RECTANGLE, cell)
-    evaluate = standing_in(linear, cell)
-    done = compensate(toolpath, targets, cell, evaluate)
-    motion, _, _, deflection = evaluate(done.targets)
+    done = corrected(toolpath, targets, cell, linear)
+    motion, _, deflection = stages(done.targets, cell, linear)
     side = np.flatnonzero(
         (motion.position_mm[:, 0] > 20.0) & (motion.position_mm[:, 0] < 80.0) & below(motion)[:, 0]
     )
@@ -123,7 +124,7 @@ def test_result_stays_when_it_is_evaluated_again(cell):
 
 def test_sharp_corner_keeps_both_lines(cell):
     toolpath, targets = read(RECTANGLE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    done = corrected(toolpath, targets, cell, everywhere)
     bent = done.evaluated[0].position_mm + done.evaluated[3].deflection_base_mm
     near = np.linalg.norm(bent[:, :2] - [100.0, 60.0], axis=1) < 5.0
     near &= bent[:, 2] < 0.0
@@ -133,7 +134,7 @@ def test_sharp_corner_keeps_both_lines(cell):
 
 def test_air_and_rapids_are_not_touched(cell):
     toolpath, targets = read(RECTANGLE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(constant, cell))
+    done = corrected(toolpath, targets, cell, constant)
     shift = np.linalg.norm(done.targets.position_mm - done.intended.position_mm, axis=1)
     rapid = done.targets.ptp | (done.targets.move < 0) | toolpath.rapid[np.maximum(done.targets.move, 0)]
     assert shift[rapid].max() == 0.0
@@ -145,21 +146,20 @@ def test_air_and_rapids_are_not_touched(cell):
 
 def test_nothing_to_correct_changes_nothing(cell):
     toolpath, targets = read(RECTANGLE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(lambda motion: 0.0 * motion.position_mm, cell))
+    done = corrected(toolpath, targets, cell, lambda motion: 0.0 * motion.position_mm)
     assert np.array_equal(done.targets.position_mm, targets.position_mm)
     assert done.figures["rows_added"] == 0
 
 
 def test_lines_are_divided_within_tolerance_and_keep_speed(cell):
     toolpath, targets = read(LINE, cell)
-    evaluate = standing_in(quadratic, cell)
     counts = {}
     for tolerance_mm in (0.05, 0.01, 0.002):
-        done = compensate(toolpath, targets, cell, evaluate, tolerance_mm=tolerance_mm)
+        done = corrected(toolpath, targets, cell, quadratic, tolerance_mm=tolerance_mm)
         counts[tolerance_mm] = done.figures["rows_added"]
         assert done.after.steady_max_mm <= tolerance_mm
     assert 0 < counts[0.05] < counts[0.01] < counts[0.002]
-    added_s = done.evaluated[0].time_s[-1] - evaluate(targets)[0].time_s[-1]
+    added_s = done.evaluated[0].time_s[-1] - plan_motion(targets, cell).time_s[-1]
     assert abs(added_s) <= 0.012 + 1e-9
     speed = done.evaluated[0].speed_mm_s[
         (done.evaluated[0].position_mm[:, 0] > 5.0) & (done.evaluated[0].position_mm[:, 0] < 95.0)
@@ -169,7 +169,7 @@ def test_lines_are_divided_within_tolerance_and_keep_speed(cell):
 
 def test_straight_correction_divides_nothing(cell):
     toolpath, targets = read(LINE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    done = corrected(toolpath, targets, cell, everywhere)
     row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
     on_line = done.intended.move == done.intended.move[row]
     assert np.count_nonzero(on_line) <= 3  # the end of the ramp after contact
@@ -177,7 +177,7 @@ def test_straight_correction_divides_nothing(cell):
 
 def test_pieces_carry_their_line(cell):
     toolpath, targets = read(RECTANGLE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(quadratic, cell))
+    done = corrected(toolpath, targets, cell, quadratic)
     moved, intended = done.targets, done.intended
     new = np.flatnonzero((moved.move[:-1] == moved.move[1:]) & (moved.move[:-1] >= 0) & ~moved.ptp[1:])
     assert len(new) == done.figures["rows_added"] > 10
@@ -198,7 +198,7 @@ def test_pieces_carry_their_line(cell):
 def test_events_stay_where_they_were(cell):
     body = "G1 Z-2 F600\nG1 X60 F1500\nM8\nG1 X100\nM9\nG1 Y40\n"
     toolpath, targets = read(body, cell)
-    done = compensate(toolpath, targets, cell, standing_in(quadratic, cell))
+    done = corrected(toolpath, targets, cell, quadratic)
     assert done.figures["rows_added"] > 0
     assert len(done.targets.events) == len(targets.events)
     for before, after in zip(targets.events, done.targets.events, strict=True):
@@ -209,7 +209,7 @@ def test_events_stay_where_they_were(cell):
 
 def test_jump_of_the_force_is_ramped(cell):
     toolpath, targets = read(LINE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(jump, cell))
+    done = corrected(toolpath, targets, cell, jump)
     shift = done.targets.position_mm - done.intended.position_mm
     on_line = np.flatnonzero(done.intended.position_mm[:, 2] == -2.0)
     step = np.linalg.norm(np.diff(shift[on_line], axis=0), axis=1)
@@ -228,7 +228,7 @@ def test_force_that_rises_over_the_cutters_radius_is_followed(cell):
         engaged = np.clip((x + 8.0) / 16.0, 0.0, 1.0)
         return np.where(below(motion) & (x > -8.0), engaged * np.array([150.0, 450.0, -50.0]), 0.0)
 
-    done = compensate(toolpath, targets, cell, standing_in(entering, cell))
+    done = corrected(toolpath, targets, cell, entering)
     assert done.before.max_mm > 1.0
     assert done.after.max_mm < 0.02
     assert done.after.rms_mm < 0.002
@@ -238,55 +238,45 @@ def test_force_that_rises_over_the_cutters_radius_is_followed(cell):
 def test_tolerance_must_be_positive(cell, tolerance_mm):
     toolpath, targets = read(LINE, cell)
     with pytest.raises(NotUnderstoodError, match="tolerance"):
-        compensate(toolpath, targets, cell, standing_in(constant, cell), tolerance_mm=tolerance_mm)
+        corrected(toolpath, targets, cell, constant, tolerance_mm=tolerance_mm)
 
 
-def test_forces_that_grow_with_the_correction_settle_or_are_refused(cell):
+def test_forces_stay_at_their_places(cell):
+    toolpath, targets = read(RECTANGLE, cell)
+    motion, forces, _ = stages(targets, cell, linear)
+    done = compensate(toolpath, targets, cell, motion, forces)
+    moved, _, kept, _ = done.evaluated
+    side = below(moved)[:, 0] & ~toolpath.rapid[moved.move] & ~moved.corner
+    assert kept.force_base_N[side] == pytest.approx(linear(moved)[side], rel=0.03)
+    assert not kept.force_base_N[moved.position_mm[:, 2] > 0.3].any()
+    assert kept.relative_band == forces.relative_band
+
+
+@pytest.mark.parametrize("later_mm", np.arange(0.0, 0.3, 0.05))
+def test_a_step_of_the_force_at_a_corner_settles_at_once(cell, later_mm):
+    """Wherever the samples of the moved path happen to be, two of which lie 0.3 mm apart."""
+    toolpath, targets = read(RECTANGLE, cell)
+
+    def leaving(motion):
+        at = motion.position_mm
+        return np.where(below(motion) & ((at[:, :1] < 99.9) | (at[:, 1:2] < later_mm)), CONSTANT, -CONSTANT)
+
+    assert corrected(toolpath, targets, cell, leaving).figures["rounds"] <= 2
+
+
+def test_a_correction_larger_than_any_robot_bends_is_refused(cell):
     toolpath, targets = read(LINE, cell)
-
-    def pushing(stiffness_N_mm):
-        def law(motion):
-            deep_mm = np.maximum(-motion.position_mm[:, 2:], 0.0)
-            return np.where(below(motion), stiffness_N_mm * deep_mm * np.array([0.0, 0.0, 1.0]), 0.0)
-
-        return standing_in(law, cell)
-
-    done = compensate(toolpath, targets, cell, pushing(200.0))
-    assert done.figures["rounds"] > 2
-    assert done.after.steady_max_mm < 0.01
-    for too_stiff in (1000.0, 4000.0):
-        with pytest.raises(RefusedError, match=r"compensation-(unsettled|large)"):
-            compensate(toolpath, targets, cell, pushing(too_stiff))
-
-
-def test_kept_forces_give_what_forces_by_position_give(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    evaluate = standing_in(linear, cell)
-    motion, _, forces, _ = evaluate(targets)
-    kept = compensate(toolpath, targets, cell, keeping_forces(toolpath, targets, motion, forces, cell))
-    found = compensate(toolpath, targets, cell, evaluate)
-    assert kept.after.steady_max_mm < 0.005
-    assert kept.figures["max_correction_mm"] == pytest.approx(found.figures["max_correction_mm"], rel=0.02)
-    assert kept.evaluated[2].relative_band == forces.relative_band
-
-
-def test_kept_forces_on_the_intended_targets_are_the_forces(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    motion, _, forces, _ = standing_in(linear, cell)(targets)
-    again = keeping_forces(toolpath, targets, motion, forces, cell)(targets)[2]
-    inside = below(motion)[:, 0] & ~toolpath.rapid[motion.move] & ~motion.corner
-    assert again.force_base_N[inside] == pytest.approx(forces.force_base_N[inside], abs=1e-6)
-    assert not again.force_base_N[motion.position_mm[:, 2] > 0.3].any()
+    with pytest.raises(RefusedError, match="compensation-large"):
+        corrected(toolpath, targets, cell, lambda motion: 20.0 * constant(motion))
 
 
 def test_unsure_deflection_is_refused_wherever_its_numbers_come_from(cell):
     toolpath, targets = read(LINE, cell)
-    unsure = standing_in(constant, cell, band=0.6)
     measured = cell.material.model_copy(update={"sure": "checked", "source": "identified from slots.csv"})
     sure = cell.compliance.model_copy(update={"sure": "checked", "robot_sure": "verified"})
     known = cell.model_copy(update={"material": measured, "compliance": sure})
     with pytest.raises(RefusedError, match="compensation-unsure") as caught:
-        compensate(toolpath, targets, known, unsure)
+        corrected(toolpath, targets, known, constant, band=0.6)
     assert "identify force" in caught.value.issues[0].remedy
 
 
@@ -299,14 +289,14 @@ def test_not_together_with_online():
 
 def test_findings_of_the_moved_targets_are_added_once(cell):
     toolpath, targets = read(LINE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(everywhere, cell))
+    done = corrected(toolpath, targets, cell, everywhere)
     assert done.targets.issues[: len(targets.issues)] == targets.issues
     assert len(set(done.targets.issues)) == len(done.targets.issues)
 
 
 def test_compensated_program_verifies(cell, tmp_path):
     toolpath, targets = read(RECTANGLE, cell)
-    done = compensate(toolpath, targets, cell, standing_in(linear, cell))
+    done = corrected(toolpath, targets, cell, linear)
     written = write_krl(done.targets, tmp_path / "part.src", cell)
     assert written.report.ok
     assert written.report.max_deviation_mm < 0.002
@@ -321,7 +311,7 @@ def test_no_lines_are_divided_where_every_target_is_a_stop(cell):
     controller = cell.controller.model_copy(update={"advance": 0})
     stopping = cell.model_copy(update={"controller": controller})
     toolpath, targets = read(LINE, stopping)
-    done = compensate(toolpath, targets, stopping, standing_in(quadratic, stopping))
+    done = corrected(toolpath, targets, stopping, quadratic)
     assert done.figures["rows_added"] == 0
     assert done.figures["after_rms_mm"] < done.figures["before_rms_mm"]
 
@@ -335,7 +325,7 @@ def test_any_constant_force_in_any_direction(force, angle):
     x, y = 80.0 * np.cos(angle), 80.0 * np.sin(angle)
     toolpath, targets = read(f"G1 Z-2 F600\nG1 X{x:.3f} Y{y:.3f} F1500\n", cell)
     law = lambda motion: np.tile(np.array(force), (len(motion), 1))  # noqa: E731
-    done = compensate(toolpath, targets, cell, standing_in(law, cell))
+    done = corrected(toolpath, targets, cell, law)
     assert done.after.steady_max_mm < 0.005
     end = int(np.flatnonzero(np.hypot(*(done.intended.position_mm[:, :2] - [x, y]).T) < 1e-3)[0])
     shift = done.targets.position_mm[end] - done.intended.position_mm[end]
