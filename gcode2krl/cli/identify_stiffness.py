@@ -64,7 +64,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     plot: str | None,
     apply_to: str | None,
     is_pulls: bool,
