@@ -1,4 +1,4 @@
-"""Fuzz inputs from outside: programs, cells, predictions, run folders, meshes, telegrams, KRL programs.
+"""Fuzz inputs from outside: programs, cells, predictions, meshes, telegrams, KRL programs.
 
 python benchmarks/fuzz.py predictions --count 10000 --seed 1
 """
@@ -7,7 +7,7 @@ import argparse
 import sys
 from importlib import import_module
 
-KINDS = ("gcode", "cells", "predictions", "runs", "meshes", "telegrams", "krl")
+KINDS = ("gcode", "cells", "predictions", "meshes", "telegrams", "krl")
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from gcode_beside_rs274 import ENDLESS, Beside, Read, by_us, difference, is_known
-from gcode_draw_blocks import blocks
-from gcode_draws import drawn, slipped
+from gcode_draws import blocks, drawn, slipped
 from gcode_rules import why_lost, why_refused_here, why_refused_there, why_unknown
 
 VALID, SLIPS = 0.35, 0.45

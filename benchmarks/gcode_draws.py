@@ -1,13 +1,299 @@
-"""Random programs that are valid by LinuxCNC's rules, and one-letter slips of them.
+"""Random programs that are valid by LinuxCNC's rules, one-letter slips of them, and random blocks.
 
 A program is a head, then steps of many kinds: moves, arcs, polar moves, cycles, offsets, tools, machine
-moves, loops, subprograms, compensated contours.
+moves, loops, subprograms, compensated contours. `Words` writes blocks, `Moves` moves, `Draw` all the others.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from gcode_draw_moves import AXES, Moves
+
+
+class Words:
+    """The lines of a program, and the modes that say what a word means."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+        self.lines: list[str] = []
+        self.inches, self.feed_mode = False, 94
+
+    def chance(self, share: float) -> bool:
+        return bool(self.rng.random() < share)
+
+    def one_of(self, choices: Sequence[Any]) -> Any:
+        return choices[int(self.rng.integers(len(choices)))]
+
+    def size(self, low: float, high: float) -> float:
+        """Return a length in the unit in force, rounded as a post rounds."""
+        value = float(self.rng.uniform(low, high)) / (25.4 if self.inches else 1.0)
+        return round(value, int(self.rng.integers(0 if not self.inches else 2, 6)))
+
+    def number(self, value: float) -> str:
+        text = f"{value:.7f}".rstrip("0")
+        text = text.rstrip(".") if self.chance(0.6) else text
+        if text.startswith(("0.", "-0.")) and len(text.partition(".")[2]) > 0 and self.chance(0.3):
+            text = text.replace("0.", ".", 1)
+        if text in ("-0", "-0.", ""):
+            text = "0"
+        return f"+{text}" if value > 0 and self.chance(0.05) else text
+
+    def word(self, letter: str, value: float) -> str:
+        blank = " " if self.chance(0.05) else ""
+        return f"{letter}{blank}{self.number(value)}"
+
+    def block(self, *words: str) -> None:
+        text = (" " if self.chance(0.8) else "").join(word for word in words if word)
+        if self.chance(0.05):
+            text = text.lower()
+        if self.chance(0.1):
+            text = f"N{len(self.lines) * 5 + 5} {text}"
+        if self.chance(0.05):
+            text += self.one_of([" (a comment)", " ; tail", "(x1)", "\t"])
+        if self.chance(0.03):
+            text = f"/{text}"
+        self.lines += [text] if self.chance(0.97) else [text, ""]
+
+    def feed_word(self) -> str:
+        """Return F where the feed mode wants one in each block, or by chance."""
+        if self.feed_mode == 93:
+            return self.word("F", self.size(1.0, 60.0) + 0.5)
+        return (
+            self.word("F", self.size(0.05, 2.0) + 0.01 if self.feed_mode == 95 else self.size(50, 3000) + 1)
+            if self.chance(0.3)
+            else ""
+        )
+
+
+AXES = {17: "XYZ", 18: "ZXY", 19: "YZX"}
+CENTRES = {"X": "I", "Y": "J", "Z": "K"}
+
+
+class Moves(Words):
+    """Steps of a program; ``here`` is where the programmed axes stand, empty while that is not known."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        super().__init__(rng)
+        self.subs: list[str] = []
+        self.programs: list[str] = []
+        self.here: dict[str, float] = {}
+        self.plane, self.absolute, self.centre_absolute = 17, True, False
+        self.spindle, self.labels, self.offset_rotated, self.length = False, 0, False, False
+
+    def stand(self) -> None:
+        """Move to a stated point, so that the next arc knows where it begins."""
+        if len(self.here) == 3:
+            return
+        self.set_absolute(True)
+        self.here = {axis: self.size(-60, 60) for axis in "XYZ"}
+        self.block("G0", *(self.word(axis, value) for axis, value in self.here.items()))
+
+    def set_absolute(self, absolute: bool) -> None:
+        if self.absolute != absolute:
+            self.absolute = absolute
+            self.block("G90" if absolute else "G91")
+
+    def axis_word(self, axis: str, to: float) -> str:
+        return self.word(axis, to if self.absolute else to - self.here[axis])
+
+    def go(self, axis: str, to: float) -> None:
+        """Remember where an axis was sent, as it was rounded in its word."""
+        self.here[axis] = round(to, 7)
+
+    def set_plane(self, plane: int) -> None:
+        if plane != self.plane and not (self.offset_rotated and plane != 17):
+            self.plane = plane
+            self.block(f"G{plane}")
+
+    def set_unit(self, inches: bool) -> None:
+        if inches == self.inches:
+            return
+        self.inches = inches
+        self.block("G20" if inches else "G21", "F20" if inches and self.feed_mode == 94 else "")
+        self.here = {}
+
+    def mode_of_feed(self, mode: int) -> None:
+        self.feed_mode = mode
+        if mode == 95 and not self.spindle:
+            self.turn()
+        feed = {
+            93: "",
+            94: self.word("F", self.size(100, 2000) + 1),
+            95: self.word("F", abs(self.size(0.1, 1)) + 0.01),
+        }
+        self.block(f"G{mode}", feed[mode])
+
+    def turn(self) -> None:
+        self.spindle = True
+        self.block(f"S{int(self.rng.integers(500, 9000))}", self.one_of(("M3", "M03")))
+
+    def straight(self) -> None:
+        self.stand()
+        axes = [axis for axis in "XYZ" if self.chance(0.55)] or ["X"]
+        code = self.one_of(("G0", "G1", "G01", "G1"))
+        words = []
+        for axis in axes:
+            to = self.size(-80, 80)
+            words.append(self.axis_word(axis, to))
+            self.go(axis, to)
+        self.block(code, *words, self.feed_word() if code != "G0" else "")
+        for _ in range(int(self.rng.integers(0, 4)) if self.feed_mode != 93 or code == "G0" else 0):
+            axis, to = self.one_of(("X", "Y", "Z")), self.size(-80, 80)
+            self.block(self.axis_word(axis, to))
+            self.go(axis, to)
+
+    def arc(self) -> None:
+        self.stand()
+        first, second, along = AXES[self.plane]
+        radius, begin = abs(self.size(1, 60)) + 0.2, float(self.rng.uniform(0, math.tau))
+        sweep = float(self.rng.uniform(0.1, math.tau - 0.1))
+        left = self.chance(0.5)
+        centre = (self.here[first] - radius * math.cos(begin), self.here[second] - radius * math.sin(begin))
+        end_angle = begin + (sweep if left else -sweep)
+        whole = self.chance(0.15)
+        end = (
+            round(centre[0] + radius * math.cos(end_angle), 7),
+            round(centre[1] + radius * math.sin(end_angle), 7),
+        )
+        words = ["G3" if left else "G2"]
+        if not whole:
+            words += [self.axis_word(first, end[0]), self.axis_word(second, end[1])]
+        if self.chance(0.3):
+            to = self.size(-40, 40)
+            words.append(self.axis_word(along, to))
+            self.go(along, to)
+        by_radius = (
+            not whole and 0.4 < sweep < math.tau - 0.4 and abs(sweep - math.pi) > 0.2 and self.chance(0.3)
+        )
+        if by_radius:
+            words.append(self.word("R", radius if sweep < math.pi else -radius))
+        else:
+            for axis, at in ((first, centre[0]), (second, centre[1])):
+                words.append(self.word(CENTRES[axis], at if self.centre_absolute else at - self.here[axis]))
+            if self.chance(0.1):
+                words.append(f"P{int(self.rng.integers(1, 4))}")
+        if not whole:
+            self.go(first, end[0])
+            self.go(second, end[1])
+        self.block(*words, self.feed_word())
+
+    def polar(self) -> None:
+        self.set_plane(17)
+        self.stand()
+        distance, angle = abs(self.size(5, 50)) + 1.0, float(self.rng.integers(-180, 181))
+        self.set_absolute(True)
+        self.block(
+            self.one_of(("G0", "G1")), self.word("@", distance), self.word("^", angle), self.feed_word()
+        )
+        self.here = {}
+
+    def feeds(self) -> None:
+        self.mode_of_feed(self.one_of((93, 94, 95, 94)))
+
+    def spindle_step(self) -> None:
+        if self.spindle and self.feed_mode != 95 and self.chance(0.2):
+            self.spindle = False
+            self.block("M5")
+        else:
+            self.turn()
+
+    def modes(self) -> None:
+        kind = int(self.rng.integers(6))
+        if kind == 0:
+            self.set_absolute(not self.absolute)
+        elif kind == 1:
+            self.centre_absolute = not self.centre_absolute
+            self.block("G90.1" if self.centre_absolute else "G91.1")
+        elif kind == 2:
+            self.set_plane(self.one_of((17, 18, 19)))
+        elif kind == 3 and not self.length:
+            self.set_unit(not self.inches)
+        elif kind == 4:
+            codes = ("G61", "G61.1", "G64", "G64 P0.05", "G64 P.02 Q0.01", "G97", "G40", "G17 G90")
+            code = self.one_of(codes)
+            self.block(code)
+            if code == codes[-1]:
+                self.plane, self.absolute = 17, True
+        else:
+            self.block(
+                self.one_of(
+                    ("M7", "M8", "M9", "M1", "M0", "M60", "(MSG, hello)", "G4 P0.5", "G4 P.25", "; note")
+                )
+            )
+
+
+HEAD = "G21 G90 G17 G94 F500\nT1 M6\nS1000 M3\nG0 X0 Y0 Z5\n"
+END = "\nG0 X1 Y2 Z3\nM2\n"
+_ALONE = (
+    *("G80", "G17", "G18", "G19", "G90", "G91", "G90.1", "G91.1", "G20", "G21", "G93", "G94", "G95"),
+    *("G94 F100", "G95 F0.1", "G93 F4", "G92.1", "G92.2", "G92.3", "G54", "G55", "G59.3", "G28.1", "G30.1"),
+    *(
+        "G43",
+        "G43 H1",
+        "G43 H2",
+        "G43 H0",
+        "G49",
+        "G43.1 Z4",
+        "G43.2 H2",
+        "T1 M6",
+        "T2 M6",
+        "T7 M6",
+        "M6",
+        "T1",
+    ),
+    *("T0 M6", "M3 S500", "M4 S600", "M5", "S0", "S900", "G4 P1", "G4 P0", "G61", "G61.1", "G64", "G64 P0.1"),
+    *("G64 P0.1 Q0.2", "G40", "G40 G1 X-5 Y2", "M7", "M9", "M8 M7", "X[#5420 + 1] Y2", "G0 Y#5421"),
+)
+_CYCLES = ("G81", "G82", "G83", "G73", "G85", "G86", "G89", "G84", "G74", "")
+
+
+class Blocks:
+    """Draws blocks, each with words that may be missing or too many."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def any_of(self, *choices: str) -> str:
+        return choices[int(self.rng.integers(len(choices)))]
+
+    def axes(self, share: float) -> str:
+        return " ".join(
+            f"{axis}{self.rng.uniform(-20, 20):.3f}" for axis in "XYZ" if self.rng.random() < share
+        )
+
+    def block(self) -> str:
+        any_of = self.any_of
+        x, y = f"X{self.rng.uniform(0, 20):.3f}", f"Y{self.rng.uniform(0, 20):.3f}"
+        kinds = (
+            f"{any_of('G0', 'G1', '')} {self.axes(0.5)} {any_of('', 'F200', 'F9')}",
+            f"{any_of('G2', 'G3', '')} {x} {y} R{any_of('30', '-30', '25', '20')} {any_of('', 'Z3', 'P2')}",
+            f"{any_of('G2', 'G3')} {any_of('I5', 'J-5', 'I3 J4', 'K4 I1', 'J2 K2')} {any_of('', 'Z3', 'P2')}",
+            " ".join(
+                (
+                    f"{any_of('G98', 'G99', '')} {any_of(*_CYCLES)} {self.axes(0.4)}",
+                    f"{any_of('Z-5', 'Y-9', 'X-7', '', '')} {any_of('R2', 'R1', 'R-3', '')}",
+                    f"{any_of('', '', 'P0.5', 'P1')} {any_of('', 'Q1', 'Q2')}",
+                    any_of("", "", "L2", "L0", "L3"),
+                )
+            ),
+            f"{any_of('G92', 'G52', 'G28', 'G30')} {self.axes(0.5)}",
+            f"G10 {any_of('L2', 'L20')} P{any_of(*'0129')} {self.axes(0.5)} {any_of('', '', 'R30', 'R-90')}",
+            f"G10 {any_of('L1', 'L10', 'L11')} P{any_of(*'127')} {any_of('Z5', 'Z-3', 'Z5 R2', '')}",
+            f"G53 {any_of('G0', 'G1', '')} {self.axes(0.6)}",
+            f"{any_of('G41.1', 'G42.1')} D{any_of('2', '0', '-1', '6')} {any_of('', 'G1 X5', 'G1 X30 Y3')}",
+            f"G0 @{self.rng.uniform(1, 20):.3f} ^{self.rng.uniform(-180, 180):.3f}",
+            any_of(*_ALONE),
+        )
+        weights = np.array([5, 3, 3, 6, 3, 2, 1, 1, 1, 1, 14], dtype=float)
+        return kinds[int(self.rng.choice(len(kinds), p=weights / weights.sum()))]
+
+
+def blocks(rng: np.random.Generator) -> bytes:
+    """Return a program of a few random blocks."""
+    drawn = Blocks(rng)
+    return (HEAD + "\n".join(drawn.block() for _ in range(int(rng.integers(1, 7)))) + END).encode("ascii")
+
 
 TOOLS = (1, 2, 7)
 STATE = ("#5420", "#5421", "#5422", "#<_x>", "#<_z>", "#<_absolute>", "#<_metric>", "#<_line>")

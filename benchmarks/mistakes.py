@@ -1,9 +1,9 @@
 """Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
-``python benchmarks/mistakes.py [--json] [--contradictions]`` runs the cases of ``mistake_cases.py``,
-``mistake_cases_hidden.py``, ``mistake_cases_five_axes.py`` and ``mistake_cases_contradictory.py`` (the last
-alone on demand) through the command line's own entry, in a temporary folder, then clean programs that must be
-translated. What passes in silence is named. The exit code is always 0: figures are printed, not judged.
+``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py``, ``mistake_cases_hidden.py``
+and ``mistake_cases_five_axes.py`` through the command line's own entry, in a temporary folder, then clean
+programs that must be translated. What passes in silence is named. The exit code is always 0: figures are
+printed, not judged. Cells that contradict themselves stand in ``tests/cell/test_contradictions.py``.
 """
 
 import argparse
@@ -18,7 +18,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from mistake_cases import CELL_HEAD, CELL_TOOLS, CLEAN, LATER, MISTAKES, PROGRAMS, Clean, Mistake
-from mistake_cases_contradictory import CONTRADICTIONS
 from mistake_cases_five_axes import FIVE_AXES
 from mistake_cases_hidden import FURTHER, REPORTED
 
@@ -231,15 +230,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Seeded mistakes through gcode2krl translate.")
     parser.add_argument("--json", action="store_true", help="One JSON object on standard output.")
     parser.add_argument("--verbose", action="store_true", help="Everything that was printed, for each case.")
-    parser.add_argument("--contradictions", action="store_true", help="Contradictory cells alone.")
     options = parser.parse_args()
     started = time.perf_counter()
     verdicts, outcomes = [], []
-    cases = () if options.contradictions else (*MISTAKES, *REPORTED, *FURTHER, *FIVE_AXES)
-    for mistake in (*cases, *CONTRADICTIONS):
+    for mistake in (*MISTAKES, *REPORTED, *FURTHER, *FIVE_AXES):
         with tempfile.TemporaryDirectory() as folder:
             verdicts.append(judge(mistake, Path(folder)))
-    for clean in () if options.contradictions else CLEAN:
+    for clean in CLEAN:
         with tempfile.TemporaryDirectory() as folder:
             outcomes.append((clean, judge_clean(clean, Path(folder))))
     figures = totals(verdicts, outcomes)

@@ -46,7 +46,7 @@ import gcode2krl  # noqa: E402
 
 # This process stays small (no numpy): Linux counts the parent's pages at the start of a child as its own.
 
-PEERS = ("rs274", "gcodeparser", "pygcode", "toppra", "freecad")
+PEERS = ("rs274", "gcodeparser", "pygcode", "freecad")
 YARDSTICK = "LinuxCNC rs274 -g, interprets only"
 AS_TYPED = "translate, as typed"
 AS_TYPED_FLAT = "translate, as typed, flat mill"
@@ -298,18 +298,6 @@ def peers(wanted: Sequence[str], part: Path, lines: int) -> tuple[list[Work], li
     return found, [f"{name}: not installed (pip install {name})" for name in missing]
 
 
-def toppra_line(part: Path, folder: Path) -> str:
-    """Return the sentence on toppra, which is timed on a piece of the path by the point."""
-    if importlib.util.find_spec("toppra") is None:
-        return "toppra: not installed (pip install toppra)"
-    once = run(peer_script("time_toppra.py", part), folder)
-    if once.problem:
-        return f"toppra: {once.problem}"
-    seconds, points = (float(word) for word in once.output.split()[-2:])
-    point_us = seconds / points * 1e6
-    return f"toppra: {point_us:.1f} us a point (time law only, {points:,.0f} points, without start-up)"
-
-
 # --- the work: ours --------------------------------------------------------------------------------
 
 
@@ -535,8 +523,6 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
     print(f"whole processes on {os.cpu_count()} processors; ratios of the best")
     print_table(table)
     words += missing
-    if "toppra" in arguments.peers:
-        words.append(toppra_line(part, folder))
     if not HAS_MOTION:
         words.append("time law and joints along it: not in this version, row skipped")
     for word in words:
@@ -648,7 +634,7 @@ def options() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--lines", type=int, default=1_000_000)
-    parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all five")
+    parser.add_argument("--peers", type=peer_names, default=list(PEERS), help="default: all four")
     parser.add_argument("--repeats", type=int, default=3, help="rounds (default: 3)")
     parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
     parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")

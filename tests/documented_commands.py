@@ -80,6 +80,6 @@ def is_mention(command: str, commands: click.Group) -> bool:
 
 
 def script_of(command: str) -> str | None:
-    """Return the script that a ``python`` command runs, as ``benchmarks/restart.py``."""
+    """Return the script that a ``python`` command runs, as ``benchmarks/mistakes.py``."""
     words = command.split()
     return words[1] if words[0] == "python" and len(words) > 1 and words[1].endswith(".py") else None

@@ -11,7 +11,6 @@ IN_TESTS = {
     "benchmarks/gap_calibrate.py": "tests/benchmarks/test_gap_calibrate.py",
     "benchmarks/gap_metamorphic.py": "tests/benchmarks/test_gap_metamorphic.py",
     "benchmarks/online_faults.py": "tests/online/test_faults.py",
-    "benchmarks/restart.py": "tests/test_restart.py",
 }
 """Benchmarks of which a test does a small part, and that test."""
 

@@ -138,26 +138,3 @@ def test_the_example_is_right(name, files, tmp_path, monkeypatch):
     result = runner.run(EXAMPLES[name], out=words.append)
     assert result.failed == 0, "".join(words)
     assert os.getcwd() == str(folder)  # noqa: PTH109 - what the example left behind
-
-
-def test_a_name_without_an_example_and_a_wrong_example_are_found():
-    def bare():
-        """Say nothing."""
-
-    def wrong():
-        """Say something.
-
-        >>> 1 + 1
-        3
-        """
-
-    assert examples_of("bare", bare) is None
-    result = doctest.DocTestRunner(verbose=False).run(examples_of("wrong", wrong), out=lambda _: None)
-    assert result.failed == 1
-
-
-def test_dir_shows_the_public_names():
-    assert set(gcode2krl.__all__) == set(dir(gcode2krl))
-    assert {"Prediction.plot", "Prediction.samples", "Issue.advice", "Cell.base_matrix", "Run.path"} <= set(
-        PUBLIC
-    )

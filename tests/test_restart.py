@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks import restart as trials
 from gcode2krl import read_gcode, set_targets, write_krl
 from gcode2krl.errors import RefusedError
 from gcode2krl.gcode import read_stream
@@ -14,6 +13,7 @@ from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.prediction import Prediction
 from gcode2krl.restart.material import ABOVE_STOCK_MM, ENTRY_MM, restarted
 from gcode2krl.restart.rows import begun_row
+from tests import restart_trials as trials
 from tests.cells import over_demonstration
 from tests.conftest import EXAMPLES
 
@@ -175,7 +175,7 @@ def test_a_saved_restart_stays_one(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_random_lines_of_the_examples(example, tmp_path):
-    done = trials.drawn([example], 4, 7, tmp_path / "cell.toml")
+    done = trials.trials_of(example, 4, 7, tmp_path / "cell.toml")
     begun = [t for t in done if not t.refused]
     assert len(begun) >= 3
     assert all(t.path and t.rapid and t.guard for t in begun), done

@@ -68,12 +68,12 @@ def with_states(inputs: Inputs, draft: Draft) -> Inputs:
     """Return inputs with what a person hangs on the tool and the speeds of the spindle."""
     force_N, spindle_rad_s = np.zeros((len(inputs), 3)), np.zeros(len(inputs))
     for state in draft.states:
-        since = inputs.time_s >= _time_of(inputs, draft, state.line, state.stood_s)
+        since = inputs.time_s >= _time_of(inputs, state.line, state.stood_s)
         force_N[since], spindle_rad_s[since] = state.pull_N, state.rpm * _RAD_S_PER_RPM
     return replace(inputs, force_base_N=force_N, spindle_rad_s=spindle_rad_s)
 
 
-def _time_of(inputs: Inputs, draft: Draft, line: int, stood_s: float) -> float:
+def _time_of(inputs: Inputs, line: int, stood_s: float) -> float:
     """Return when the robot has stood for a time after the move of a line."""
     there = np.flatnonzero(inputs.source_line <= line)
     if len(there) == 0:

@@ -17,6 +17,7 @@ from gcode2krl.cli.cache import cache_options, chosen_cache
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
+    VERBOSE,
     dialect_option,
     isolated_option,
     search_option,
@@ -233,7 +234,7 @@ INTERRUPTED = 130
     "--comment-every", type=click.IntRange(0, 10**9), help="Motions between comments with the G-code line."
 )
 @click.option("--report", is_flag=True, help="Write a page to look at beside each program.")
-@click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
+@VERBOSE
 @click.option(
     "-q", "--quiet", is_flag=True, help="Print nothing but the findings of parts that were not written."
 )
@@ -251,7 +252,6 @@ def command(
     job_path: str | None,
     report: bool,
     isolated: bool,
-    verbose: bool,
     quiet: bool,
     as_json: bool,
     **options: Any,

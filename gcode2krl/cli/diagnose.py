@@ -52,7 +52,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
 ) -> int:
     """Say where measured runs differ from their prediction, which effects explain it, and how far it shrinks.
 

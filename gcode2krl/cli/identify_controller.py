@@ -59,7 +59,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     tolerance_mm: float | None,
     plot: str | None,
     apply_to: str | None,

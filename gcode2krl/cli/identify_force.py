@@ -9,7 +9,7 @@ import numpy as np
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import require_fit_outputs
+from gcode2krl.cli.inputs import VERBOSE, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.units import MS_PER_S
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option("--zeroed", is_flag=True, help="The sensor was zeroed in air before the run: fit no zero.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
-@click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
+@VERBOSE
 def command(
     run_folder: str,
     prediction: str | None,
@@ -40,7 +40,6 @@ def command(
     zeroed: bool,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
 ) -> int:
     """Fit the six coefficients of the linear edge law to the measured force of a run.
 

@@ -63,7 +63,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     robot: str,
     columns: tuple[str, ...],
     unit: tuple[str, ...],

@@ -51,7 +51,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     output: str | None,
     gravity: tuple[float, float, float],
     noise_N: float,

@@ -64,7 +64,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     plot: str | None,
     apply_to: str | None,
     is_pulls: bool,
@@ -115,7 +114,7 @@ def _pulls(
     form: str, cell_path: str | None, plot: str | None, apply_to: str | None, percent: float, console: Console
 ) -> int:
     """Fit a filled-in form of pulls."""
-    from gcode2krl.cli import pulls as told
+    from gcode2krl.cli import pulls
     from gcode2krl.identify.pulls import fit, read_form
 
     try:
@@ -125,13 +124,13 @@ def _pulls(
         require_fit_outputs(None, apply_to, cell_path, form, form)
         result = fit(read_form(form), cell, percent / 100.0)
         is_applied = apply_to is not None and not result.errors()
-        files = [told.apply(result, Path(apply_to))] if apply_to is not None and is_applied else []
+        files = [pulls.apply(result, Path(apply_to))] if apply_to is not None and is_applied else []
     except Gcode2KrlError as error:
-        return console.refused(error, told.KEYS, form)
+        return console.refused(error, pulls.KEYS, form)
     exit_code = 1 if result.errors() else 0
     if console.as_json:
-        return console.record(told.record_of(result), result.issues, exit_code=exit_code, files=files)
-    told.say_fit(result, cell, console)
+        return console.record(pulls.record_of(result), result.issues, exit_code=exit_code, files=files)
+    pulls.say_fit(result, console)
     console.findings(result.issues, result.source)
     for file in files:
         console.say(f"  wrote  {file}")

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "STANDARD",
+    "VERBOSE",
     "cell_files",
     "common_options",
     "effect_files",
@@ -60,6 +61,12 @@ __all__ = [
 ]
 
 
+VERBOSE = click.option(
+    "-v", "--verbose", is_flag=True, expose_value=False, help="Show details of an internal error."
+)
+"""`main` looks for it in the words of the command line."""
+
+
 def _use_threads(_context: click.Context, _option: click.Parameter, count: int | None) -> None:
     """Let every stage use so many threads."""
     if count is not None:
@@ -76,7 +83,7 @@ def common_options(function: Any) -> Any:
             callback=_use_threads,
             help="Threads to use; default: one a core.",
         ),
-        click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error."),
+        VERBOSE,
         click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),
         click.option(

@@ -10,7 +10,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import read_cell
+from gcode2krl.cli.inputs import VERBOSE, read_cell
 from gcode2krl.errors import input_error
 
 POST = "gcode2krl_post.py"
@@ -33,10 +33,8 @@ _MACRO_PATH = re.compile(r'<FCText Name="MacroPath">([^<]+)</FCText>')
 @click.option("--folder", metavar="DIR", help="FreeCAD's macro folder, where it is not found.")
 @click.option("--remove", is_flag=True, help="Remove the hook again.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
-@click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
-def command(
-    cam: str, cell_path: str | None, folder: str | None, remove: bool, quiet: bool, verbose: bool
-) -> int:
+@VERBOSE
+def command(cam: str, cell_path: str | None, folder: str | None, remove: bool, quiet: bool) -> int:
     """Put gcode2krl into a CAM system's list of post processors.
 
     FreeCAD's own LinuxCNC post writes the G-code, the job's cutters and stock are handed over, findings stand

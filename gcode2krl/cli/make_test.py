@@ -88,7 +88,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     at_mm: Point | None,
     size_mm: float | None,
     speed_percent: float | None,

@@ -76,7 +76,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     tolerance_mm: float | None,
     chord_tolerance_mm: float,
     dialect: str,

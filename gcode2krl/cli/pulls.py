@@ -67,7 +67,7 @@ def write_form(
     return 0
 
 
-def say_fit(fit: "PullFit", cell: "Cell", console: Console) -> None:
+def say_fit(fit: "PullFit", console: Console) -> None:
     """Print the stiffness of each axis with its interval, beside what the arm's class suggests."""
     from gcode2krl.identify.pulls import AXES
 

@@ -7,7 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
-from gcode2krl.cli.inputs import existing
+from gcode2krl.cli.inputs import VERBOSE, existing
 from gcode2krl.cli.nominal import HASH_KEY, KEY, compared, on_page
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.translation.page import part_of, require_report, stock_corners_mm, text_of
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "--nominal", metavar="PART.stl", help="The nominal part, where it no longer lies where it was given."
 )
-@click.option("-v", "--verbose", is_flag=True, help="Show details of an internal error.")
+@VERBOSE
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but findings.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
 def command(
@@ -33,7 +33,6 @@ def command(
     output: str | None,
     gcode: str | None,
     nominal: str | None,
-    verbose: bool,
     quiet: bool,
     as_json: bool,
 ) -> int:

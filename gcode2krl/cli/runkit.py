@@ -36,7 +36,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
 ) -> int:
     """Write what a program is accepted with: a variant in air, its prediction, a trace set-up, a check list.
 

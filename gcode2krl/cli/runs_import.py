@@ -56,7 +56,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
 ) -> int:
     """Make a run of a log: CSV of any kind, Excel, Parquet, MATLAB v5, RSI telegrams, a KRC trace.
 

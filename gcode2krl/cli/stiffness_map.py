@@ -66,7 +66,6 @@ def command(
     cell_path: str | None,
     as_json: bool,
     quiet: bool,
-    verbose: bool,
     load_N: Three | None,
     feed: Three | None,
     at_mm: Three,

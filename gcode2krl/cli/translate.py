@@ -88,7 +88,7 @@ if TYPE_CHECKING:
 )
 @from_line_option
 @options_of_project
-def command(as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
+def command(as_json: bool, quiet: bool, **options: Any) -> int:
     """Translate G-code into a KRL program, verify it, and print a summary.
 
     Exit code 0: written (warnings allowed); 1: understood and refused; 2: not understood.

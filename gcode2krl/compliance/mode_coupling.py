@@ -91,13 +91,13 @@ def coupling_index(
         unstable = grows(rows, np.full(len(rows), gain))
         high[rows[unstable]], low[rows[~unstable]] = gain, gain
         gain *= _STEP
-    found = np.isfinite(high)
-    rows = np.flatnonzero(found)
+    swings = np.isfinite(high)
+    rows = np.flatnonzero(swings)
     for _ in range(_HALVINGS):
         middle = (low[rows] + high[rows]) / 2.0
         unstable = grows(rows, middle)
         high[rows[unstable]], low[rows[~unstable]] = middle[unstable], middle[~unstable]
-    return np.where(finite, np.where(found, 1.0 / np.where(found, high, 1.0), 0.0), np.nan)
+    return np.where(finite, np.where(swings, 1.0 / np.where(swings, high, 1.0), 0.0), np.nan)
 
 
 def _dies_out(drag: Floats, stiffness: Floats) -> Bools:

@@ -293,8 +293,8 @@ class Findings:
                 "let the tool stick out further, or cut in shallower steps",
             ),
         )
-        for code, found, sentence, remedy in kinds:
-            for stretch in found:
+        for code, stretches, sentence, remedy in kinds:
+            for stretch in stretches:
                 words = sentence.format(depth=stretch.worst, tool=stretch.tool)
                 yield Issue(self._severity, code, stretch.line, words, remedy)
 

@@ -117,12 +117,12 @@ def _path(
     tool = np.searchsorted(numbers, motion.tool).astype(np.int32)
     joined = np.append(False, tool[1:] == tool[:-1])
     way = shaped(position, turned(motion.direction, to_field), motion.path_mm, joined)
-    own = tool[way.sample]
-    first = np.append(True, own[1:] != own[:-1])
+    tool_of_place = tool[way.sample]
+    first = np.append(True, tool_of_place[1:] != tool_of_place[:-1])
     rapid = toolpath.rapid[np.clip(motion.move, 0, len(toolpath) - 1)][way.sample]
     steps_mm = lengths(np.diff(way.position_mm, axis=0, prepend=way.position_mm[:1]))
     place = np.ascontiguousarray(way.position_mm)
-    return Path(place, np.cumsum(steps_mm), own, rapid, first, outlines), way.sample
+    return Path(place, np.cumsum(steps_mm), tool_of_place, rapid, first, outlines), way.sample
 
 
 class _Events(NamedTuple):

@@ -66,17 +66,6 @@ def feed_per_tooth(speed_mm_s: ArrayLike, spindle_rad_s: ArrayLike, teeth: int) 
     return np.asarray(np.where(turning, per_tooth, 0.0))
 
 
-def contact_feed(f_z_mm: ArrayLike, advance_mm: ArrayLike) -> Floats:
-    """Return the feed per tooth (n,) limited to what the tool has advanced into virgin stock.
-
-    ``advance_mm`` (n,) is the path since the first contact; inf in a running cut. The tooth that meets
-    untouched material cannot take more than the tool has entered it. That is the real advance, not the
-    distance between two samples, which spans many teeth.
-    """
-    advance = np.maximum(np.asarray(advance_mm, dtype=float), 0.0)
-    return np.asarray(np.minimum(np.asarray(f_z_mm, dtype=float), advance))
-
-
 def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.0) -> Floats:
     """Return the largest chip thickness (n,) in mm on a cylinder's edge and on the bottom over the arcs.
 
@@ -86,8 +75,8 @@ def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.
     arcs = np.ascontiguousarray(np.atleast_2d(np.asarray(phi_rad, dtype=float)))
     out = np.empty(len(arcs))
     feed, gamma = (
-        np.ascontiguousarray(np.broadcast_to(np.asarray(each, dtype=float), out.shape))
-        for each in (f_z_mm, ramp_rad)
+        np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=float), out.shape))
+        for values in (f_z_mm, ramp_rad)
     )
     largest_chips(arcs, feed, gamma, out)
     return out

@@ -130,10 +130,10 @@ def _places(cells: Bools, volume_mm3: Floats) -> tuple[list[tuple[slice, slice, 
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sums = np.bincount(number.ravel(), weights=volume_mm3.ravel(), minlength=count + 1)
     places, volumes = [], []
-    for one, box in enumerate(find_objects(number), start=1):
-        if sizes[one] >= _FEWEST_CELLS:
-            places.append((box[0], box[1], number[box] == one))
-            volumes.append(float(sums[one]))
+    for piece, box in enumerate(find_objects(number), start=1):
+        if sizes[piece] >= _FEWEST_CELLS:
+            places.append((box[0], box[1], number[box] == piece))
+            volumes.append(float(sums[piece]))
     return places, volumes
 
 

@@ -56,8 +56,8 @@ def _all_files(places: Sequence[Path], part: Path) -> set[Path]:
 
 def _named_in(file: Path, places: Sequence[Path]) -> set[Path]:
     """Return the subprograms of a Sinumerik whose names stand in a file: a name alone is a call."""
-    found = (near for place in places for near in place.glob("*.[sSmM][pP][fF]") if near != file)
-    near = {each.stem.upper().encode(): each for each in found if each.is_file()}
+    files = (near for place in places for near in place.glob("*.[sSmM][pP][fF]") if near != file)
+    near = {each.stem.upper().encode(): each for each in files if each.is_file()}
     if not near:
         return set()
     try:

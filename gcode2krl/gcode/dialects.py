@@ -284,7 +284,7 @@ class Dialect:
     """How parameters, jumps and subprograms are written; LinuxCNC's go with its polar words @ and ^."""
     has_m61_to_m73: bool = False
     """M61 to M73 are LinuxCNC's (tool number, outputs, saved modes), not the machine builder's."""
-    own: tuple[float, ...] = ()
+    own_codes: tuple[float, ...] = ()
     """The only G numbers that are those of the core; empty: all that it does not read otherwise."""
     same: Mapping[int, int] = field(default_factory=dict)
     """G numbers that are others of the core: 710 is 21."""
@@ -352,8 +352,12 @@ class Dialect:
     def core_g(self) -> Ints32:
         """Return the core's G number by that of the dialect, both ten times, (10000,); below 0: none."""
         table = np.full(d.MOST_CODES + 1, d.CODE_UNKNOWN, np.int32)
-        own = np.array([_tenfold(code) for code in self.own]) if self.own else np.arange(v.LARGEST_G + 1)
-        table[own] = own
+        kept = (
+            np.array([_tenfold(code) for code in self.own_codes])
+            if self.own_codes
+            else np.arange(v.LARGEST_G + 1)
+        )
+        table[kept] = kept
         for special, codes in (
             (d.CODE_HARMLESS, self.harmless),
             (d.CODE_EXACT, self.exact),
@@ -558,7 +562,7 @@ _LIST: Final = (
         "Sinumerik 840D sl, as CAM posts write it",
         programs=d.PROGRAMS_SINUMERIK,
         syntax=d.SKIP_LEVEL | d.HEAD_LINES | d.STATEMENTS,
-        own=(0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
+        own_codes=(0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 53, 54, 55, 56, 57, 64, 90, 91, 93, 94, 95, 96, 97),
         same={700: 20, 710: 21, 71: 21, 60: 61, 641: 64, 642: 64, 643: 64, 644: 64, 645: 64, 153: 53},
         exact=(9,),
         no_offset=(500,),

@@ -107,8 +107,8 @@ class Translator:
         self._kinds_of_holes = len(set(re.findall(r"CYCL DEF (20[0137])\b", text)))
         self._labels_at: dict[str, list[int]] = {}
         for k, line in enumerate(self._lines):
-            if (found := _LABEL.match(_code(line)[0])) is not None:
-                self._labels_at.setdefault(found[1], []).append(k)
+            if (label := _LABEL.match(_code(line)[0])) is not None:
+                self._labels_at.setdefault(label[1], []).append(k)
 
     def text(self) -> str:
         """Return the program as a Sinumerik's."""
@@ -164,22 +164,18 @@ class Translator:
         return "M30" if self._computes or not any("M30" in line for line in self._out) else ""
 
     def _tool_call(self, code: str) -> str:
-        found = _TOOL.match(code)
-        if (
-            found is None
-            or found[2] not in (None, "Z")
-            or any(_float(v) for v in re.findall(_VALUE, found[5]))
-        ):
+        call = _TOOL.match(code)
+        if call is None or call[2] not in (None, "Z") or any(_float(v) for v in re.findall(_VALUE, call[5])):
             raise _RefusedError(r.REASON_TOOL_CALL)
         words = []
-        if found[1] is not None:
+        if call[1] is not None:
             self._forget_place()
-            words.append(f"T={found[1]} M6" if found[1].startswith('"') else f"T{found[1]} M6")
-        if found[3] is not None:
-            self._speed = _expression(found[3])
+            words.append(f"T={call[1]} M6" if call[1].startswith('"') else f"T{call[1]} M6")
+        if call[3] is not None:
+            self._speed = _expression(call[3])
             words.append(f"S={self._speed}")
-        if found[4] is not None:
-            self._feed = _expression(found[4])
+        if call[4] is not None:
+            self._feed = _expression(call[4])
             words.append(f"F={self._feed}")
         return " ".join(words)
 
@@ -217,10 +213,10 @@ class Translator:
     def _dwell(self, code: str) -> str:
         if code.startswith("CYCL DEF 9.0"):
             return ""
-        found = re.match(rf"CYCL DEF 9\.1 [A-Z. ]*({_VALUE})$", code)
-        if found is None:
+        match = re.match(rf"CYCL DEF 9\.1 [A-Z. ]*({_VALUE})$", code)
+        if match is None:
             raise _RefusedError(r.REASON_TNC_WORD)
-        return f"G4 F={_expression(found[1])}"
+        return f"G4 F={_expression(match[1])}"
 
     def _stop(self, code: str) -> str:
         return " ".join(["M0", *self._m_words(_tokens(code.removeprefix("STOP")))])
@@ -228,19 +224,19 @@ class Translator:
     # --- parameters, labels -------------------------------------------------------------------------
 
     def _formula(self, code: str) -> str:
-        found = _FORMULA.match(code)
-        if found is None or not _PLAIN_FORMULA.match(found[2]):
+        match = _FORMULA.match(code)
+        if match is None or not _PLAIN_FORMULA.match(match[2]):
             raise _RefusedError(r.REASON_VALUES)
-        return f"QV{int(found[1])}={_expression(found[2].strip())}"
+        return f"QV{int(match[1])}={_expression(match[2].strip())}"
 
     def _function(self, code: str) -> str:
         if (test := _TEST.match(code)) is not None:
-            left, right = _expression(test[1]), _expression(test[3])
-            return f"IF {left}{_TESTS[test[2]]}{right} GOTO {self._label_of(test[4])}"
-        found = _FUNCTION.match(code)
-        if found is None:
+            lhs, rhs = _expression(test[1]), _expression(test[3])
+            return f"IF {lhs}{_TESTS[test[2]]}{rhs} GOTO {self._label_of(test[4])}"
+        match = _FUNCTION.match(code)
+        if match is None:
             raise _RefusedError(r.REASON_VALUES)
-        kind, target, first, sign, second = int(found[1]), int(found[2]), *found.groups()[2:]
+        kind, target, first, sign, second = int(match[1]), int(match[2]), *match.groups()[2:]
         named = {5: "SQRT", 6: "SIN", 7: "COS"}.get(kind)
         if named is not None and first == named and sign is None and second is not None:
             return f"QV{target}={named}({_expression(second)})"
@@ -254,36 +250,36 @@ class Translator:
         return self._labels.setdefault(name, f"LBL_{len(self._labels)}")
 
     def _label(self, code: str) -> str:
-        found = _LABEL.match(code)
-        if found is None:
+        match = _LABEL.match(code)
+        if match is None:
             raise _RefusedError(r.REASON_FLOW)
         self._forget_place()  # other lines lead here too
-        if found[1] == "0":
+        if match[1] == "0":
             self._ends += 1
             return f"LEND_{self._ends}:"
-        return f"{self._label_of(found[1])}:"
+        return f"{self._label_of(match[1])}:"
 
     def _call_label(self, code: str) -> str:
-        found = _CALL.match(code)
-        begin = self._labels_at.get(found[1], []) if found is not None else []
-        if found is None or len(begin) != 1 or (found[2] is not None and begin[0] > self._k):
+        call = _CALL.match(code)
+        begin = self._labels_at.get(call[1], []) if call is not None else []
+        if call is None or len(begin) != 1 or (call[2] is not None and begin[0] > self._k):
             raise _RefusedError(r.REASON_TNC_LABEL)
         self._forget_place()
-        if found[2] is not None:
-            return f"REPEAT {self._label_of(found[1])} P={int(found[2])}"
-        end = self._end_of(found[1])
-        return f"REPEAT {self._label_of(found[1])} LEND_{end} P=1"
+        if call[2] is not None:
+            return f"REPEAT {self._label_of(call[1])} P={int(call[2])}"
+        end = self._end_of(call[1])
+        return f"REPEAT {self._label_of(call[1])} LEND_{end} P=1"
 
     def _end_of(self, name: str) -> int:
         """Return which LBL 0 is the first behind a label."""
         ends, inside = 0, False
         for line in self._lines:
-            found = _LABEL.match(_code(line)[0])
-            if found is not None and found[1] == "0":
+            label = _LABEL.match(_code(line)[0])
+            if label is not None and label[1] == "0":
                 ends += 1
                 if inside:
                     return ends
-            inside = inside or (found is not None and found[1] == name)
+            inside = inside or (label is not None and label[1] == name)
         raise _RefusedError(r.REASON_TNC_LABEL)
 
     # --- moves --------------------------------------------------------------------------------------
@@ -338,10 +334,10 @@ class Translator:
         """Return a block that moves, with the hole behind it that M99 or M89 asks for."""
         self._motion = self._k
         ends = {int(t["m"]) for t in tokens if t["m"]} & {89, 99}
-        rest = self._m_words(tokens)
+        m_words = self._m_words(tokens)
         hole = [self._hole_here()] if ends or self._modal else []
         self._modal = self._modal and 99 not in ends
-        return " ".join([motion, *words, *self._feed_words(tokens), *rest, *hole])
+        return " ".join([motion, *words, *self._feed_words(tokens), *m_words, *hole])
 
     def _line(self, code: str) -> str:
         tokens = _tokens(code[1:])
@@ -391,14 +387,14 @@ class Translator:
         return self._moved("G0" if fast else "G1", tokens, words)
 
     def _centre(self, code: str) -> str:
-        found = re.findall(rf"(I?)([XY]) *({_VALUE})", code)
-        if not found or any(incremental for incremental, _, _ in found):
+        coordinates = re.findall(rf"(I?)([XY]) *({_VALUE})", code)
+        if not coordinates or any(incremental for incremental, _, _ in coordinates):
             raise _RefusedError(r.REASON_TNC_POLE)
-        for _, axis, value in found:
+        for _, axis, value in coordinates:
             self._pole[axis] = _expression(value)
         if not self._computes:
             return ""
-        return " ".join(f"QP{axis}={_expression(value)}" for _, axis, value in found)
+        return " ".join(f"QP{axis}={_expression(value)}" for _, axis, value in coordinates)
 
     def _pole_word(self, axis: str) -> str:
         if axis not in self._pole and not self._computes:
@@ -460,10 +456,10 @@ class Translator:
         return [f"{axis}={value:.9f}" for axis, value in end.items()]
 
     def _corner(self, code: str) -> str:
-        found = re.match(rf"(RND|CHF) *R?({_VALUE})(?: *F({_VALUE}))?$", code)
-        if found is None or found[3] is not None or self._motion < 0:
+        match = re.match(rf"(RND|CHF) *R?({_VALUE})(?: *F({_VALUE}))?$", code)
+        if match is None or match[3] is not None or self._motion < 0:
             raise _RefusedError(r.REASON_CORNER)
-        self._out[self._motion] += f" {'RND' if found[1] == 'RND' else 'CHR'}={_expression(found[2])}"
+        self._out[self._motion] += f" {'RND' if match[1] == 'RND' else 'CHR'}={_expression(match[2])}"
         return ""
 
     # --- cycles -------------------------------------------------------------------------------------
@@ -472,16 +468,16 @@ class Translator:
         if code.startswith("CYCL DEF 1.0"):
             self._hole, self._modal, self._pecking = "", False, {}
             return ""
-        found = re.match(rf"CYCL DEF 1\.([1-5]) ?[A-Z ]*\.? ?({_VALUE})$", code)
-        if found is None or self._computes:
+        match = re.match(rf"CYCL DEF 1\.([1-5]) ?[A-Z ]*\.? ?({_VALUE})$", code)
+        if match is None or self._computes:
             raise _RefusedError(r.REASON_HOLE)
-        self._pecking[found[1]] = _expression(found[2])
+        self._pecking[match[1]] = _expression(match[2])
         return ""
 
     def _define_hole(self, code: str) -> str:
         self._hole, self._modal, self._pecking = "", False, {}
-        found = _CYCLE.match(code)
-        number = int(found[1]) if found else 0
+        match = _CYCLE.match(code)
+        number = int(match[1]) if match else 0
         words = dict(_Q_WORD.findall(code))
         mixed = self._computes and self._kinds_of_holes > 1  # a called label may not know which is defined
         if mixed or any(name not in words for name in _CYCLE_WORDS[number]):
@@ -510,12 +506,12 @@ class Translator:
         return self._hole
 
     def _call_hole(self, code: str) -> str:
-        rest = code.removeprefix("CYCL CALL").strip()
-        if rest.startswith("PAT"):
+        operation = code.removeprefix("CYCL CALL").strip()
+        if operation.startswith("PAT"):
             raise _RefusedError(r.REASON_CYCLE)
-        if not rest.startswith("POS"):
-            return " ".join([self._hole_here(), *self._m_words(_tokens(rest))])
-        tokens = _tokens(rest.removeprefix("POS"))
+        if not operation.startswith("POS"):
+            return " ".join([self._hole_here(), *self._m_words(_tokens(operation))])
+        tokens = _tokens(operation.removeprefix("POS"))
         if any(t["axis"] not in ("X", "Y", None) for t in tokens):
             raise _RefusedError(r.REASON_HOLE)
         words = [*self._words(tokens), *self._m_words(tokens), self._hole_here()]
@@ -570,15 +566,15 @@ def _code(line: str) -> tuple[str, bool]:
 
 def _tokens(text: str) -> list[re.Match[str]]:
     """Return the words of a move; what is none is refused."""
-    found, at = [], 0
+    tokens, at = [], 0
     for token in _TOKEN.finditer(text):
         if text[at : token.start()].strip():
             break
-        found.append(token)
+        tokens.append(token)
         at = token.end()
     if text[at:].strip():
         raise _RefusedError(r.REASON_TNC_WORD)
-    return found
+    return tokens
 
 
 def _expression(value: str) -> str:

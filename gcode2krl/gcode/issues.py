@@ -73,20 +73,20 @@ _NOTES = {
 }
 
 
-def lines_to_quote(found: NDArray[np.void], state: Record) -> set[int]:
+def lines_to_quote(raised: NDArray[np.void], state: Record) -> set[int]:
     """Return the file lines that the findings and notes so far speak of."""
-    lines = {int(line) for line in found["line"]}
+    lines = {int(line) for line in raised["line"]}
     return lines | {int(line) for line in state["note_line"]} | {int(state["spiral_line"])}
 
 
 def found_issues(
-    found: NDArray[np.void], counts: Record, state: Record, texts: Mapping[int, bytes]
+    raised: NDArray[np.void], counts: Record, state: Record, texts: Mapping[int, bytes]
 ) -> list[Issue]:
     """Return the findings in the order of the file, then how many more there are.
 
     ``texts`` are the blocks by line, for quoting them.
     """
-    rows = found[: counts["findings"]]
+    rows = raised[: counts["findings"]]
     issues = [_issue(row, texts) for row in rows]
     misfits = [k for k, row in enumerate(rows) if row["number"] == findings.F.ARC_RADIUS_MISMATCH]
     if misfits:

@@ -61,14 +61,14 @@ class MacroLine(NamedTuple):
 def parsed(line: bytes) -> MacroLine:
     """Return what a line says, without its expressions."""
     for word, pattern in _STATEMENTS.items():
-        found = pattern.match(line)
-        if found is None:
+        match = pattern.match(line)
+        if match is None:
             continue
-        number = found["number"] if "number" in pattern.groupindex else None
+        number = match["number"] if "number" in pattern.groupindex else None
         if word == "while":
             loop = _DO.search(line)
             number = loop[1] if loop is not None else b"0"
-        return MacroLine(word, str(int(number or b"0")), found.end(), found["deleted"] is not None)
+        return MacroLine(word, str(int(number or b"0")), match.end(), match["deleted"] is not None)
     slash = line.lstrip(b" \t\r").startswith(b"/")
     return MacroLine("", "", 0, slash)
 
@@ -117,8 +117,8 @@ class MacroFlow:
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
-        for each in self._open:
-            self._fault(each.row, findings.PF.FAULT_DO_OPEN)
+        for loop in self._open:
+            self._fault(loop.row, findings.PF.FAULT_DO_OPEN)
         self._open.clear()
 
     def _set(self, row: int, kind: int, target: int = -1) -> None:
@@ -175,10 +175,10 @@ def labels_of(
     are those of earlier files.
     """
     numbers, lines, line, place = [], [], first_line, 0
-    for found in _NUMBERED.finditer(text):
-        line += text.count(b"\n", place, found.start())
-        place = found.start()
-        number = int(re.sub(rb"[ \t]", b"", found[1]))
+    for match in _NUMBERED.finditer(text):
+        line += text.count(b"\n", place, match.start())
+        place = match.start()
+        number = int(re.sub(rb"[ \t]", b"", match[1]))
         if number < _MOST_NUMBER:
             numbers.append(number)
             lines.append(line)

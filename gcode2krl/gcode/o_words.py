@@ -62,13 +62,13 @@ class OLine(NamedTuple):
 
 def parsed(line: bytes) -> OLine:
     """Return what an O-line says, without its expressions."""
-    found = _LINE.match(line)
-    if found is None:
+    match = _LINE.match(line)
+    if match is None:
         return OLine("", "(" if _COMMENT_BEFORE.match(line) else "", 0)
-    if found["computed"] is not None:
-        word = "call" if _CALL.search(line, found.end("computed")) else ""
-        return OLine("", word, found.end("computed"))
-    name, number, word_found = found["name"], found["number"], found["word"]
+    if match["computed"] is not None:
+        word = "call" if _CALL.search(line, match.end("computed")) else ""
+        return OLine("", word, match.end("computed"))
+    name, number, word_found = match["name"], match["number"], match["word"]
     label = (
         _SPACE.sub(b"", name).lower().decode("latin-1")
         if name is not None
@@ -76,10 +76,10 @@ def parsed(line: bytes) -> OLine:
     )
     if word_found is not None:
         word = _SPACE.sub(b"", word_found).lower().decode()
-        ends = word not in _WITHOUT_EXPRESSION or _ALONE.match(line, found.end()) is not None
-        return OLine(label, word, found.end(), ends)
-    alone = _ALONE.match(line, found.end()) is not None
-    return OLine(label, "program" if alone and number is not None else "", found.end())
+        ends = word not in _WITHOUT_EXPRESSION or _ALONE.match(line, match.end()) is not None
+        return OLine(label, word, match.end(), ends)
+    alone = _ALONE.match(line, match.end()) is not None
+    return OLine(label, "program" if alone and number is not None else "", match.end())
 
 
 class Definition(NamedTuple):
@@ -137,9 +137,9 @@ class Flow:
 
     def add_refused(self, row: int, *, is_o_line: bool) -> None:
         """Take a line that is refused even where it is passed over: whatever it stands in leads there."""
-        for each in self._open:
-            each.unread = row if each.unread is None else each.unread
-            each.end_unread |= is_o_line
+        for block in self._open:
+            block.unread = row if block.unread is None else block.unread
+            block.end_unread |= is_o_line
 
     def finish(self) -> None:
         """Whatever is open at the end of the file has no end."""
@@ -158,11 +158,11 @@ class Flow:
     def _unread(self, row: int, fault: int) -> None:
         """Take a line that makes no sense, and remember it for all that is open around it."""
         self._fault(row, fault)
-        for each in reversed(self._open):
-            if each.word == "sub":
+        for block in reversed(self._open):
+            if block.word == "sub":
                 break
-            each.unread = row if each.unread is None else each.unread
-            each.end_unread = True
+            block.unread = row if block.unread is None else block.unread
+            block.end_unread = True
 
     def _lead_to_unread(self, closed: _Open) -> None:
         """Let what has a line inside that makes no sense lead there, so that it is reported."""
@@ -188,11 +188,11 @@ class Flow:
         return None
 
     def _close_all(self, depth: int) -> None:
-        for each in self._open[depth:]:
-            if self.lines["kind"][each.row] != tables.KIND_FAULT:
-                self._fault(each.row, findings.PF.FAULT_NO_CLOSING)
-            if each.end_unread:
-                self._lead_to_unread(each)
+        for block in self._open[depth:]:
+            if self.lines["kind"][block.row] != tables.KIND_FAULT:
+                self._fault(block.row, findings.PF.FAULT_NO_CLOSING)
+            if block.end_unread:
+                self._lead_to_unread(block)
         del self._open[depth:]
 
     def _set_jumps(self, rows: list[int], target: int) -> None:
@@ -214,25 +214,25 @@ class Flow:
         self._branch(row, label, tables.KIND_ELSE)
 
     def _branch(self, row: int, label: Label, kind: int) -> None:
-        found = self._end(row, label, "if")
-        if found is None:
+        block = self._end(row, label, "if")
+        if block is None:
             return
-        self._open.append(found)
-        if self.lines["kind"][found.branches[-1]] == tables.KIND_ELSE:
+        self._open.append(block)
+        if self.lines["kind"][block.branches[-1]] == tables.KIND_ELSE:
             self._fault(row, findings.PF.FAULT_NO_OPENING)
             return
         self._set(row, kind)
-        self.lines["target"][found.branches[-1]] = self._word(row)
-        found.branches.append(row)
+        self.lines["target"][block.branches[-1]] = self._word(row)
+        block.branches.append(row)
 
     def _endif(self, row: int, label: Label) -> None:
-        found = self._end(row, label, "if")
-        if found is None:
+        block = self._end(row, label, "if")
+        if block is None:
             return
         self._set(row, tables.KIND_ENDIF)
-        self.lines["target"][found.branches[-1]] = self._word(row)
-        self.lines["end"][found.branches] = self._word(row)
-        self._lead_to_unread(found)
+        self.lines["target"][block.branches[-1]] = self._word(row)
+        self.lines["end"][block.branches] = self._word(row)
+        self._lead_to_unread(block)
 
     # --- loops ----------------------------------------------------------------------------------------
 
@@ -240,12 +240,12 @@ class Flow:
         if self._enclosing(label, "do") is None:
             self._begin(row, label, "while", tables.KIND_WHILE)
             return
-        found = self._end(row, label, "do")
-        if found is not None:
-            self._set(row, tables.KIND_DO_WHILE, self._word(found.row) + 1)
-            self._set_jumps(found.breaks, self._word(row) + 1)
-            self._set_jumps(found.continues, self._word(row))
-            self._lead_to_unread(found)
+        block = self._end(row, label, "do")
+        if block is not None:
+            self._set(row, tables.KIND_DO_WHILE, self._word(block.row) + 1)
+            self._set_jumps(block.breaks, self._word(row) + 1)
+            self._set_jumps(block.continues, self._word(row))
+            self._lead_to_unread(block)
 
     def _do(self, row: int, label: Label) -> None:
         self._begin(row, label, "do", tables.KIND_NOTHING)
@@ -260,26 +260,26 @@ class Flow:
         self._end_loop(row, label, "repeat")
 
     def _end_loop(self, row: int, label: Label, word: str) -> None:
-        found = self._end(row, label, word)
-        if found is None:
+        block = self._end(row, label, word)
+        if block is None:
             return
-        self._set(row, tables.KIND_JUMP, self._word(found.row))
-        self.lines["target"][found.row] = self._word(row) + 1
-        self._set_jumps(found.breaks, self._word(row) + 1)
-        self._set_jumps(found.continues, self._word(found.row))
-        self._lead_to_unread(found)
+        self._set(row, tables.KIND_JUMP, self._word(block.row))
+        self.lines["target"][block.row] = self._word(row) + 1
+        self._set_jumps(block.breaks, self._word(row) + 1)
+        self._set_jumps(block.continues, self._word(block.row))
+        self._lead_to_unread(block)
 
     def _break(self, row: int, label: Label) -> None:
-        found = self._enclosing(label, "while", "do")
+        block = self._enclosing(label, "while", "do")
         self._fault(row, findings.PF.FAULT_NOT_IN_LOOP)  # until the loop ends
-        if found is not None:
-            found.breaks.append(row)
+        if block is not None:
+            block.breaks.append(row)
 
     def _continue(self, row: int, label: Label) -> None:
-        found = self._enclosing(label, "while", "do")
+        block = self._enclosing(label, "while", "do")
         self._fault(row, findings.PF.FAULT_NOT_IN_LOOP)
-        if found is not None:
-            found.continues.append(row)
+        if block is not None:
+            block.continues.append(row)
 
     # --- subprograms ----------------------------------------------------------------------------------
 
@@ -303,16 +303,16 @@ class Flow:
         return next((each for each in self._open if each.word == "sub"), None)
 
     def _endsub(self, row: int, label: Label) -> None:
-        found = self._sub_at_hand()
-        if found is None or found.label != label:
+        block = self._sub_at_hand()
+        if block is None or block.label != label:
             self._fault(row, findings.PF.FAULT_NOT_IN_SUB)
             return
-        self._close_all(self._open.index(found) + 1)
+        self._close_all(self._open.index(block) + 1)
         self._open.pop()
         self._labels.pop()
         self._set(row, tables.KIND_ENDSUB)
-        self.lines["target"][found.row] = self._word(row) + 1
-        self._lead_to_unread(found)
+        self.lines["target"][block.row] = self._word(row) + 1
+        self._lead_to_unread(block)
 
     def _return(self, row: int, _label: Label) -> None:
         # LinuxCNC leaves the subprogram whatever the label is: that of an if or a loop around it too

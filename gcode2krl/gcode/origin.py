@@ -259,10 +259,10 @@ def refuse_foreign(text: bytes, name: str) -> None:
     code = _COMMENT.sub(_blanks, head)
     for foreign in _FOREIGN:
         searched = head if foreign.in_comments else code
-        found = foreign.pattern.search(searched)
+        match = foreign.pattern.search(searched)
         against = foreign.unless is not None and foreign.unless.search(code)
-        if found is not None and not against:
-            place = found.start() + len(found[0]) - len(found[0].lstrip())
+        if match is not None and not against:
+            place = match.start() + len(match[0]) - len(match[0].lstrip())
             line = 1 + head.count(b"\n", 0, place)
             raise input_error(foreign.code, foreign.what, foreign.remedy, line=line, source=name)
 
@@ -271,9 +271,9 @@ def control_of(text: bytes) -> Mark | None:
     """Return whose control's program a text is, by its surest mark; None where nothing tells."""
     code = _COMMENT.sub(_blanks, text)
     for control, pattern in _MARKS:
-        found = pattern.search(code)
-        if found is not None:
-            return Mark(control, _shown(found[0]), 1 + code.count(b"\n", 0, found.start()))
+        match = pattern.search(code)
+        if match is not None:
+            return Mark(control, _shown(match[0]), 1 + code.count(b"\n", 0, match.start()))
     number = _HEAD_NUMBER.search(code[:_HEAD_BYTES])
     if number is not None:
         return Mark(_FANUC, _shown(number[1]), 1 + code.count(b"\n", 0, number.start(1)))
@@ -283,9 +283,9 @@ def control_of(text: bytes) -> Mark | None:
 def cam_of(text: bytes) -> str:
     """Return the CAM system that the comments at the top name, empty where none is."""
     said = b"\n".join(_COMMENT.findall(_head(text)))
-    found = _CAM.search(said)
-    if found is not None:
-        return found[1].decode()
+    match = _CAM.search(said)
+    if match is not None:
+        return match[1].decode()
     return next((name for phrase, name in _CAM_PHRASES.items() if phrase in said.lower()), "")
 
 
@@ -293,8 +293,8 @@ def _named_in_comments(text: bytes) -> Mark | None:
     head = _head(text)
     for comment in _COMMENT.finditer(head):
         for control, pattern in _POSTS:
-            found = pattern.search(comment[0])
-            if found is not None:
+            match = pattern.search(comment[0])
+            if match is not None:
                 return Mark(control, _shown(comment[0]), 1 + head.count(b"\n", 0, comment.start()))
     return None
 

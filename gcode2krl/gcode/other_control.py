@@ -39,8 +39,8 @@ def with_other_control(
     first = Issue(
         "error", "other-dialect", mark.line, what + listed + " not listed", _remedy(other, remaining)
     )
-    rest = [issue for issue in error.issues if issue.severity != "error" and issue.code not in _COUNTS]
-    return NotUnderstoodError([first, *kept, *rest], error.source)
+    notes = [issue for issue in error.issues if issue.severity != "error" and issue.code not in _COUNTS]
+    return NotUnderstoodError([first, *kept, *notes], error.source)
 
 
 def doubts_of_control(toolpath: Toolpath, mark: Mark | None, dialect: str, reread: Reread) -> Iterator[Issue]:

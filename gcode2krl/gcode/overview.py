@@ -79,8 +79,8 @@ def overview_of(path: str | Path, dialect: str | None = None, search: tuple[str,
     toolpath, issues = _read(path, spoken, search)
     if toolpath is None and dialect is None and any(issue.code == "decimal-point" for issue in issues):
         spoken = "fanuc-calculator"
-        toolpath, beside = _read(path, spoken, search)
-        issues = (*beside, *(issue for issue in issues if issue.code == "decimal-point"))
+        toolpath, doubts = _read(path, spoken, search)
+        issues = (*doubts, *(issue for issue in issues if issue.code == "decimal-point"))
     code = _COMMENT.sub(b" ", text) if spoken != "sinumerik" else re.sub(rb";[^\n]*", b" ", text)
     named = list(named_tools(text, 1))
     return Overview(

@@ -91,15 +91,15 @@ def unread_of(given: int, body: Iterable[bytes], *, of_fanuc: bool) -> int:
         if _BEFORE_M98.search(code):  # the program that it calls has the same parameters
             return 0
         sets = 0
-        for found in _PARAMETER.finditer(code):
-            if found["number"] is None:
-                if code.startswith(b"<", found.end()):
+        for parameter in _PARAMETER.finditer(code):
+            if parameter["number"] is None:
+                if code.startswith(b"<", parameter.end()):
                     continue
                 return 0  # its number is computed
-            number = int(re.sub(rb"\s", b"", found["number"]))
+            number = int(re.sub(rb"\s", b"", parameter["number"]))
             if number > _MOST:
                 continue
-            if found["sets"]:
+            if parameter["sets"]:
                 sets |= 1 << number
             elif not assigned >> number & 1:
                 arguments |= 1 << number
@@ -134,7 +134,7 @@ class HandsOver(NamedTuple):
     machine: Any
     state: NDArray[Any]
     counts: NDArray[Any]
-    found: NDArray[Any]
+    raised: NDArray[Any]
 
 
 class File(NamedTuple):
@@ -361,8 +361,8 @@ class Program:
         file = next(k for k, end in enumerate(self._ends) if word < end)
         if not self._is_macro or not self._in_file(label, file):
             self._read_file(label)
-        found = self._macro(label, file) if self._is_macro else self._definition(label, file, word)
-        if found is None:
+        definition = self._macro(label, file) if self._is_macro else self._definition(label, file, word)
+        if definition is None:
             self._report(hands_over, word, findings.F.SUBPROGRAM_MISSING)
             return
         if self._is_macro and len(self._in_file(label, file)) > 1:
@@ -370,8 +370,8 @@ class Program:
             return
         self._tell_subprograms()
         ready = self._subprograms[self._labels[label]]
-        ready["number"], ready["entry"] = int(label) if label.isdigit() else -1, found.entry
-        ready["is_ready"], ready["is_program"] = 1, found.is_program
+        ready["number"], ready["entry"] = int(label) if label.isdigit() else -1, definition.entry
+        ready["is_ready"], ready["is_program"] = 1, definition.is_program
 
     def _wanted_label(self) -> Label:
         row = int(self.course["wanted"][0])
@@ -395,8 +395,8 @@ class Program:
 
     def _macro(self, label: Label, file: int) -> Definition | None:
         """Return where a program of a Fanuc begins: in the file that calls it, else in its own."""
-        own = [k for k in range(1, len(self.files)) if self._is_own(k, label)]
-        return next((each for k in (file, *own) for each in self._in_file(label, k)), None)
+        namesakes = [k for k in range(1, len(self.files)) if self._is_own(k, label)]
+        return next((each for k in (file, *namesakes) for each in self._in_file(label, k)), None)
 
     def _is_own(self, file: int, label: Label) -> bool:
         name = self.files[file].name
@@ -411,10 +411,10 @@ class Program:
             self.add(str(path), path.read_bytes(), 1, messages=0)
 
     def _report(self, hands_over: HandsOver, word: int, number: int, fault: int = 0) -> None:
-        counts, found = hands_over.counts, hands_over.found
+        counts, raised = hands_over.counts, hands_over.raised
         row = int(counts["findings"][0])
-        if row < len(found):
-            found[row] = (number, int(self._line[word]), float(fault), 0.0, -1.0)
+        if row < len(raised):
+            raised[row] = (number, int(self._line[word]), float(fault), 0.0, -1.0)
             counts["findings"] += 1
         counts["errors"] += 1
         self.course["is_stopped"] = 1
@@ -455,8 +455,8 @@ class Program:
         if not self._is_elsewhere(issue.line):
             return replace(issue, message=message)
         name, line = self.place(issue.line)
-        told = f"{message} (in {Path(name).name} line {line})"
-        return replace(issue, line=0, message=told, file=name, file_line=line)
+        message_with_place = f"{message} (in {Path(name).name} line {line})"
+        return replace(issue, line=0, message=message_with_place, file=name, file_line=line)
 
     def _is_elsewhere(self, line: int) -> bool:
         return len(self.files) > 1 and line >= self.files[1].first_line
@@ -469,8 +469,8 @@ class Program:
 
     def texts(self, lines: Iterable[int]) -> dict[int, bytes]:
         """Return lines of the program by their numbers."""
-        own = {id(file): file.text.split(b"\n") for file in {self._file(n) for n in lines}}
-        return {n: own[id(self._file(n))][n - self._file(n).first_line] for n in lines}
+        lines_of = {id(file): file.text.split(b"\n") for file in {self._file(n) for n in lines}}
+        return {n: lines_of[id(self._file(n))][n - self._file(n).first_line] for n in lines}
 
     def _file(self, line: int) -> File:
         return next((file for file in reversed(self.files) if file.first_line <= line), self.files[0])

@@ -250,8 +250,8 @@ def _interpreted(
             if stopped_at is not None:
                 # a jump may lead back to a line that has run, as far as it is in this piece
                 begin = stopped_at if spoken.programs == d.PROGRAMS_LINUXCNC else first_line
-                rest = text[_start_of_line(text, begin - first_line) :]
-                whole = b"".join((rest, *(more for _, more, _ in scanned)))
+                unread = text[_start_of_line(text, begin - first_line) :]
+                whole = b"".join((unread, *(more for _, more, _ in scanned)))
                 interpreter.run_whole(whole, begin, stopped_at, folders)
                 break
             named += named_tools(text, first_line)
@@ -365,13 +365,13 @@ class _Interpreter:
         self.counts["rows"] = self.rows_at_start = self.columns.begin(self.state[0])
         self.chord_tolerance_mm = settings["chord_tolerance_mm"]
         self.events = np.zeros(_FIRST_EVENTS, dtype=EVENT)
-        self.found = np.zeros(_MOST_ISSUES, dtype=FOUND)
+        self.raised = np.zeros(_MOST_ISSUES, dtype=FOUND)
         self.machine: Any = machine.MACHINE(
             state=self.state,
             counts=self.counts,
             rows=self.columns.views(),
             events=self.events,
-            found=self.found,
+            found=self.raised,
             saved=np.zeros(FRAMES, MODES),
             **spoken.settings(),
             group_of_g=GROUP_OF_G,
@@ -446,17 +446,17 @@ class _Interpreter:
         program = Program(self.name, self.spoken, folders, block_delete=bool(self.machine.block_delete))
         program.add(self.name, text, first_line, len(self.messages))
         program.start_at(begin)
-        program.run(HandsOver(self.machine, self.state, self.counts, self.found), self._make_room)
+        program.run(HandsOver(self.machine, self.state, self.counts, self.raised), self._make_room)
         self.messages += [_decode(message) for message in program.messages]
         self.most_decimals = max(self.most_decimals, program.most_decimals)
-        found = self.found[: self._count("findings")]
-        wanted = {n for n in lines_to_quote(found, self.state[0]) if n >= first_line}
+        raised = self.raised[: self._count("findings")]
+        wanted = {n for n in lines_to_quote(raised, self.state[0]) if n >= first_line}
         self.texts |= program.texts(wanted)
         self.program = program
 
     def _remember_lines(self, text: bytes, first_line: int, found_before: int) -> None:
         """Keep the blocks of this piece that findings speak of, so that they can be quoted."""
-        new = self.found[found_before : self._count("findings")]
+        new = self.raised[found_before : self._count("findings")]
         wanted = {n for n in lines_to_quote(new, self.state[0]) if n >= first_line and n not in self.texts}
         if not wanted:
             return
@@ -489,13 +489,13 @@ class _Interpreter:
         """Raise the errors that were found, or return the table."""
         if self.original is not None:
             self.texts = {n: self.original[n - 1] for n in self.texts if 0 < n <= len(self.original)}
-        known = found_issues(self.found, self.counts[0], self.state[0], self.texts)
+        known = found_issues(self.raised, self.counts[0], self.state[0], self.texts)
         if self.state["corner"][0]:  # the program has ended before the block that makes it
             line = int(self.state["corner_line"][0])
             known.append(make_issue(findings.F.DIALECT_STATEMENT, line, REASON_CORNER, 0.0, 0.0, ""))
-        found = [self._placed(issue) for issue in known]
-        if any(issue.severity == "error" for issue in found):
-            raise NotUnderstoodError((i for i in found if i.severity != "warning"), self.name)
+        placed = [self._placed(issue) for issue in known]
+        if any(issue.severity == "error" for issue in placed):
+            raise NotUnderstoodError((i for i in placed if i.severity != "warning"), self.name)
         whole = program_issues(
             self.state[0],
             self.texts,
@@ -505,7 +505,7 @@ class _Interpreter:
             programs=self.spoken.programs,
         )
         of_calls = self.program.argument_issues() if self.program is not None else ()
-        return self._toolpath((*found, *map(self._placed, (*whole, *of_calls))), cell, head)
+        return self._toolpath((*placed, *map(self._placed, (*whole, *of_calls))), cell, head)
 
     def _placed(self, issue: Issue) -> Issue:
         """Return a finding whose lines are named with their file, where that is not the main program's."""

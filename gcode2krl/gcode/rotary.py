@@ -78,28 +78,28 @@ def in_part(
         Where the cell lacks a length of the machine, a tool vector turns back by 180°, or a program turns
         so far that its chords have no room.
     """
-    rest = {name: column for name, column in columns.items() if name not in ("turn", "turn_mode", "time_s")}
+    kept = {name: column for name, column in columns.items() if name not in ("turn", "turn_mode", "time_s")}
     if not columns["turn"].any():
         upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(columns["turn"]), 3))
-        return TurnedColumns(rest, upright, events, ())
+        return TurnedColumns(kept, upright, events, ())
     way = _Way(columns, machine, source)
     chords = way.chords(chord_tolerance_mm)
     owner = np.repeat(np.arange(len(chords)), chords)
     number = np.arange(len(owner)) - (np.cumsum(chords) - chords)[owner]
     tip, axis = way.at(owner, (number + 1) / chords[owner])
     ends = number + 1 == chords[owner]
-    rest = {name: column[owner] for name, column in rest.items()}
-    rest["dwell_s"] = np.where(ends, rest["dwell_s"], 0.0)
-    rest["exact_stop"] = rest["exact_stop"] & ends
-    rest["known"] = way.known()[owner]
-    rest["position_mm"] = tip
+    kept = {name: column[owner] for name, column in kept.items()}
+    kept["dwell_s"] = np.where(ends, kept["dwell_s"], 0.0)
+    kept["exact_stop"] = kept["exact_stop"] & ends
+    kept["known"] = way.known()[owner]
+    kept["position_mm"] = tip
     time_s, turn_deg = way.time_s()[owner] / chords[owner], _angle_deg(axis[:-1], axis[1:])
     on_spot = np.concatenate([[False], np.linalg.norm(np.diff(tip, axis=0), axis=1) < _SPOT_MM])
-    rest["feed_mm_s"] = _feeds(rest, tip, time_s, on_spot)
-    issues = tuple(_turns_on_spot(rest, np.append(0.0, turn_deg), time_s, on_spot, vel_ori_deg_s))
+    kept["feed_mm_s"] = _feeds(kept, tip, time_s, on_spot)
+    issues = tuple(_turns_on_spot(kept, np.append(0.0, turn_deg), time_s, on_spot, vel_ori_deg_s))
     last = np.cumsum(chords) - 1
     moved = tuple(event._replace(row=int(last[event.row])) for event in events)
-    return TurnedColumns(rest, axis, moved, issues)
+    return TurnedColumns(kept, axis, moved, issues)
 
 
 def posed(machine: "Machine", stand: Floats, deg: Floats, lift_mm: Floats) -> tuple[Floats, Floats]:

@@ -150,14 +150,14 @@ def _names_defined(text: bytes) -> Iterator[tuple[bytes, str, int, int]]:
         formal = _FORMAL.match(part)
         if formal is not None:
             yield formal["type"].upper(), formal["name"].upper().decode(), 0, 0
-    for found in _DEFINED.finditer(text):
-        for part in _BETWEEN_COMMAS.findall(found["names"].rstrip(b" \t\r")):
+    for definition in _DEFINED.finditer(text):
+        for part in _BETWEEN_COMMAS.findall(definition["names"].rstrip(b" \t\r")):
             name = _VARIABLE.match(part)
             if name is None:
                 continue
             rows, columns = (int(name[size] or 0) for size in ("rows", "columns"))
             if _size(rows, columns) <= _MOST_ELEMENTS and (rows > 0 or not name["rows"]):
-                yield found["type"].upper(), name["name"].upper().decode(), rows, columns
+                yield definition["type"].upper(), name["name"].upper().decode(), rows, columns
 
 
 def with_own_names(text: bytes, taken: Container[str]) -> bytes:
@@ -218,10 +218,10 @@ class SiemensFlow:
         """Words at which the lines of a label or a block number begin, in their order."""
         names, numbers = [], []
         for line, content in enumerate(self._contents, start=first_line):
-            found = _LINE.match(content)
-            if found is None:
+            match = _LINE.match(content)
+            if match is None:
                 continue
-            for name in (found["label"], b"N%d" % int(found["block"]) if found["block"] else None):
+            for name in (match["label"], b"N%d" % int(match["block"]) if match["block"] else None):
                 if name is not None:
                     names.append(name.upper())
                     numbers.append(line)
@@ -257,18 +257,18 @@ class SiemensFlow:
 
     # --- jumps ------------------------------------------------------------------------------------------
 
-    def _jump(self, row: int, found: re.Match[bytes]) -> None:
-        target = self._target(found["target"].upper(), found["way"].upper(), int(self._word_of_row[row]))
+    def _jump(self, row: int, match: re.Match[bytes]) -> None:
+        target = self._target(match["target"].upper(), match["way"].upper(), int(self._word_of_row[row]))
         if target is None:
-            if found["way"].upper() != b"C":  # GOTOC goes on where there is no such label
+            if match["way"].upper() != b"C":  # GOTOC goes on where there is no such label
                 self._fault(row, findings.PF.FAULT_NO_LABEL)
             else:
                 self._lines["kind"][row] = tables.KIND_NOTHING
             return
-        self._lines["kind"][row] = tables.KIND_JUMP if found["test"] is None else tables.KIND_SIEMENS_IF
+        self._lines["kind"][row] = tables.KIND_JUMP if match["test"] is None else tables.KIND_SIEMENS_IF
         self._lines["target"][row] = target
-        if found["test"] is not None:
-            self._lines["expression"][row] = self._lines["start"][row] + found.start("test")
+        if match["test"] is not None:
+            self._lines["expression"][row] = self._lines["start"][row] + match.start("test")
 
     def _target(self, name: bytes, way: bytes, word: int) -> int | None:
         """Return the next line of a name forwards (F), the last one backwards (B), or either."""
@@ -279,11 +279,11 @@ class SiemensFlow:
             return known[split]
         return known[split - 1] if way != b"F" and split else None
 
-    def _case(self, row: int, found: re.Match[bytes]) -> None:
-        at, word = found.start("ways"), int(self._word_of_row[row])
+    def _case(self, row: int, match: re.Match[bytes]) -> None:
+        at, word = match.start("ways"), int(self._word_of_row[row])
         self._lines["kind"][row] = tables.KIND_CASE
-        self._lines["expression"][row] = self._lines["start"][row] + found.start("value")
-        while (way := _WAY.match(found.string, at, found.end("ways"))) is not None:
+        self._lines["expression"][row] = self._lines["start"][row] + match.start("value")
+        while (way := _WAY.match(match.string, at, match.end("ways"))) is not None:
             at = way.end()
             target = self._target(way["target"].upper(), way["way"].upper(), word)
             if target is None:
@@ -293,7 +293,7 @@ class SiemensFlow:
                 self.cases.append((row, int(way["number"]), target))
             else:
                 self._lines["target"][row] = target
-        if at == found.start("ways") or found.string[at : found.end("ways")].strip():
+        if at == match.start("ways") or match.string[at : match.end("ways")].strip():
             self._fault(row, findings.PF.FAULT_CASE)
 
     def _fault(self, row: int, fault: int) -> None:
@@ -354,11 +354,11 @@ class SiemensFlow:
 
     # --- repeated sections ------------------------------------------------------------------------------
 
-    def _section(self, row: int, found: re.Match[bytes]) -> None:
+    def _section(self, row: int, match: re.Match[bytes]) -> None:
         here = int(self._word_of_row[row])
-        begin = self._only(found["first"])
-        last = begin if found["one"] else self._only(found["last"]) if found["last"] else None
-        if begin is None or (found["last"] and last is None):
+        begin = self._only(match["first"])
+        last = begin if match["one"] else self._only(match["last"]) if match["last"] else None
+        if begin is None or (match["last"] and last is None):
             self._fault(row, findings.PF.FAULT_SECTION_LABEL)
             return
         if last is not None:
@@ -371,7 +371,7 @@ class SiemensFlow:
             return
         lines = self._lines
         lines["kind"][row], lines["target"][row], lines["end"][row] = tables.KIND_SECTION, begin, until
-        times = found.start("times")
+        times = match.start("times")
         lines["expression"][row] = lines["start"][row] + max(0, times)
 
     def _only(self, name: bytes) -> int | None:

@@ -4,7 +4,7 @@ import re
 
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _LETTER_O = re.compile(r"[A-MP-Z]\s*[-+]?[\d.]*O[\d.]*")
-_STATEMENT = re.compile(r"[A-Z]O[A-Z]|(?:^|\])\s*(?:N\d+\s*)?DO\s*\d")
+_MACRO_STATEMENT = re.compile(r"[A-Z]O[A-Z]|(?:^|\])\s*(?:N\d+\s*)?DO\s*\d")
 """GOTO, POPEN, DO1: statements of a macro."""
 _EXPONENT = re.compile(r"[\d.]E[-+]?\d")
 
@@ -13,9 +13,9 @@ def slip(block: bytes, code: str, letter: str) -> tuple[str, str] | None:
     """Return sentence and remedy for a finding ``code`` on ``letter`` if its block shows a usual slip."""
     text = _COMMENT.sub(" ", block.decode("latin-1")).rstrip()
     capitals = text.upper() if len(text.upper()) == len(text) else text
-    found = _LETTER_O.search(capitals)
-    if code in ("o-word", "no-number") and found and not _STATEMENT.search(capitals):
-        word = found[0].replace(" ", "")
+    match = _LETTER_O.search(capitals)
+    if code in ("o-word", "no-number") and match and not _MACRO_STATEMENT.search(capitals):
+        word = match[0].replace(" ", "")
         if code == "o-word" or word[0] == letter:
             return (
                 f"the letter O stands in the number of {word[0]}",

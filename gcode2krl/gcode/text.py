@@ -31,7 +31,7 @@ def pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
     Raises `NotUnderstoodError` where it is empty, no text, or a gzip file that is cut off, damaged, or grows
     as no program does.
     """
-    line, rest, first = 1, b"", True
+    line, unfinished, first = 1, b"", True
     for block in _blocks(stream, name):
         if first:
             first = False
@@ -41,7 +41,7 @@ def pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
             _reject_binary(block, name)
             _reject_lone_returns(block, name)
         at_end = not block
-        text = rest + (block if not at_end or not rest else b"\n")
+        text = unfinished + (block if not at_end or not unfinished else b"\n")
         end = text.rfind(b"\n") + 1
         if len(text) - end > LINE_LIMIT:
             place = line + text.count(b"\n")
@@ -56,7 +56,7 @@ def pieces(stream: BinaryIO, name: str) -> Iterator[tuple[int, bytes]]:
             whole = text[:end]
             yield line, whole
             line += _line_count(whole)
-        rest = text[end:]
+        unfinished = text[end:]
 
 
 def beginning(path: str | Path, name: str, most_bytes: int) -> bytes:

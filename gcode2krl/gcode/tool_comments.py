@@ -115,15 +115,15 @@ def other_tools(named: list[NamedTool], toolpath: Toolpath, cell: "Cell") -> Ite
     used = {int(number) for number in distinct(toolpath.tool[1:])}
     used -= {0} if len(used) > 1 else set()
     only = next(iter(used)) if len(used) == 1 else 0
-    told: set[int] = set()
+    named_once: set[int] = set()
     for said in named:
         number = said.tool if said.tool is not None else only
         tool = cell.tool.get(number)
-        if number in told or number not in used or tool is None or tool.kind == "tapered":
+        if number in named_once or number not in used or tool is None or tool.kind == "tapered":
             continue
         if _may_be(said, tool.diameter_mm):
             continue
-        told.add(number)
+        named_once.add(number)
         unit = f" {said.unit}" if said.unit else ""
         is_sure = said.tool is not None and (tool.sure in _SURE or cell.is_confirmed)
         yield Issue(

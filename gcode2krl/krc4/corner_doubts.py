@@ -34,7 +34,7 @@ class _Reading(NamedTuple):
 
 def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
     """Return the one note on corners whose path or time depends on what a KRC4 is assumed to do."""
-    told: list[tuple[float, int, str]] = []
+    doubts: list[tuple[float, int, str]] = []
     error_mm = chain.corner_error_mm()
     for reading in _readings(targets, chain, cell):
         other_mm, other_s = reading.chain.corner_error_mm(), plan(reading.chain, cell).total_s
@@ -48,12 +48,12 @@ def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) 
         if parts:
             where = "1 corner joins" if reading.corners == 1 else f"{reading.corners} corners join"
             sentence = f"{where} {reading.words}, {' and '.join(parts)}"
-            told.append((float(max(far, share)), line, sentence))
-    if not told:
+            doubts.append((float(max(far, share)), line, sentence))
+    if not doubts:
         return ()
-    told.sort(reverse=True)
-    sentence = "; ".join(sentence for _, _, sentence in told) + " (unverified)"
-    line = next((line for _, line, _ in told if line), 0)
+    doubts.sort(reverse=True)
+    sentence = "; ".join(sentence for _, _, sentence in doubts) + " (unverified)"
+    line = next((line for _, line, _ in doubts if line), 0)
     remedy = "`gcode2krl make-test controller`, its trace to `identify controller`: it settles or lists each"
     return (Issue("note", "corner-undecided", line, sentence, remedy),)
 

@@ -130,8 +130,8 @@ def usual_coupling(poses: Poses, direction: Floats, cell: Cell) -> Floats:
         sideways, deeper = way @ slope, way @ (-force / depth[0])
         process = sideways[:, :, None] * normal[:, None, :] + deeper[:, :, None] * axis[rows][:, None, :]
         q_rad = robot.inverse(poses.position_mm[rows], poses.rotation[rows], cell, number).reshape(-1, 6)
-        found = coupling_index(tip_stiffness(q_rad, cell, number), np.repeat(process, 8, axis=0))
-        index[rows] = found.reshape(-1, 8)
+        coupling = coupling_index(tip_stiffness(q_rad, cell, number), np.repeat(process, 8, axis=0))
+        index[rows] = coupling.reshape(-1, 8)
     return index
 
 

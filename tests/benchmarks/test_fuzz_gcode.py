@@ -10,10 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-import fuzz_gcode_beside as beside
 import gcode_rules as rules
 from gcode_beside_rs274 import Beside, by_us, difference
-from gcode_draws import drawn, slipped
+from gcode_draws import drawn
 
 from gcode2krl.errors import Issue
 
@@ -39,14 +38,6 @@ def test_draws_are_of_many_kinds():
     assert not [word for word in words if word not in text]
 
 
-def test_a_slip_changes_a_letter_or_two():
-    for number in range(100):
-        program = drawn(rng(number))
-        slip = slipped(rng(number), program)
-        assert abs(len(slip) - len(program)) <= 1
-        assert slip.count(b"\n") == program.count(b"\n")
-
-
 def test_every_rule_has_its_row():
     page = (ROOT / "docs" / "gcode.md").read_text(encoding="utf-8")
     table = page[page.index("## Where it differs from LinuxCNC") :]
@@ -61,14 +52,6 @@ def test_what_no_row_names_is_not_explained():
     )
     assert not rules.why_refused_there("Unknown word starting with E | E")
     assert not rules.why_refused_there("runs without an end")
-
-
-def test_without_rs274_it_runs_alone_and_says_so(monkeypatch, capsys):
-    monkeypatch.setattr(beside.shutil, "which", lambda name: None)
-    assert beside.run(0.5, 3) == 0
-    said = capsys.readouterr().out
-    assert "no rs274" in said
-    assert "unexplained: 0" in said
 
 
 @with_rs274
@@ -116,22 +99,3 @@ def test_where_rs274_loses_a_rotation_at_m6_the_tip_stands_still(tmp_path):
     moved = text.replace(b"R30\n", b"R30\nG0 X1 Y2\n")
     assert difference(by_us(moved)[1], Beside(tmp_path).read(moved).moves) == ""
     assert not rules.why_lost(moved, off)
-
-
-@with_rs274
-def test_a_refusal_of_one_alone_is_a_fault_unless_a_row_explains_it(tmp_path, monkeypatch):
-    other, tally = Beside(tmp_path), beside.Tally()
-    monkeypatch.setattr(beside, "VALID", 0.0)
-    monkeypatch.setattr(beside, "SLIPS", 1.0)
-    for text, faults in (
-        (b"G21\nG0 X1 B5\nM2\n", 0),
-        (b"G21\nG0 X1\nM250\nM2\n", 0),
-        (b"G21\nG96 S5\nM2\n", 0),
-    ):
-        monkeypatch.setattr(beside, "slipped", lambda rng, program, text=text: text)
-        beside.one(rng(0), 0, other, tally)
-        assert len(tally.faults) == faults, text
-    monkeypatch.setattr(beside, "why_refused_here", lambda issue: "")
-    monkeypatch.setattr(beside, "slipped", lambda rng, program: b"G21\nG0 X1 B5\nM2\n")
-    beside.one(rng(0), 0, other, tally)
-    assert len(tally.faults) == 1

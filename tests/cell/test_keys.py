@@ -4,7 +4,7 @@ import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cell import Cell, resolve_cell
-from gcode2krl.cell.wrong_keys import meant_key
+from gcode2krl.cell.loading import meant_key
 from gcode2krl.errors import NotUnderstoodError
 
 

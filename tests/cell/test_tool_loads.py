@@ -8,7 +8,7 @@ from gcode2krl.cli.cell_list import missing_keys, to_confirm
 from gcode2krl.effects.inputs import bodies_of
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.statements import tool_statements
-from gcode2krl.runkit.checklist import _tool_lines
+from gcode2krl.runkit.kit import _tool_lines
 from tests.cells import over_demonstration
 
 HEAVY = {

@@ -7,7 +7,6 @@ from gcode2krl.cell.library import names, read_model
 from gcode2krl.cell.sections import Kienzle, Material, Tool
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import (
-    contact_feed,
     feed_per_tooth,
     largest_chip,
     law_array,
@@ -79,13 +78,6 @@ def test_feed_per_tooth():
     omega = 13_000 * 2 * pi / 60  # the paper's cut: 25 mm/s at 13,000 rpm, three teeth
     f_z = feed_per_tooth([25.0, 25.0, 0.0, 25.0], [omega, -omega, omega, 0.0], 3)
     np.testing.assert_allclose(f_z, [0.0385, 0.0385, 0, 0], atol=5e-5)
-
-
-def test_first_contact_takes_no_more_than_the_tool_has_entered():
-    np.testing.assert_array_equal(
-        contact_feed([0.05, 0.05, 0.05, 0.05], [0.0, 0.02, 0.3, np.inf]), [0.0, 0.02, 0.05, 0.05]
-    )
-    assert contact_feed(0.05, -1.0) == 0
 
 
 @pytest.mark.parametrize(

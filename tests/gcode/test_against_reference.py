@@ -4,7 +4,6 @@ import io
 
 import pytest
 
-from benchmarks.controls_twice import places
 from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
 from tests.reference import controls
@@ -103,6 +102,9 @@ def test_two_readings_lead_to_the_same_places(dialect, lines):
     lines = lines.replace("6 CP IPA", "6 CC X+5 Y+0\n6 CP IPA")
     text = f"{HEAD[dialect]}{lines}\n"
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", CELL, dialect=dialect)
-    ours, theirs = controls.columns(places(toolpath)), controls.columns(controls.READERS[dialect](text))
+    ours, theirs = (
+        controls.columns(controls.places_of(toolpath)),
+        controls.columns(controls.READERS[dialect](text)),
+    )
     assert len(theirs) > 1
     assert controls.difference(ours, theirs) is None, (ours, theirs)

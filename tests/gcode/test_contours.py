@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from benchmarks.controls_twice import places
 from gcode2krl import Gcode2KrlError
 from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
@@ -63,7 +62,7 @@ def test_corners_of_a_compensated_contour_against_a_second_reading(code, side, c
     lines = SQUARE.format(corner, corner, corner).replace("G42", f"{side} {code}")
     text, toolpath = read(lines)
     ours, theirs = (
-        controls.columns(places(toolpath)),
+        controls.columns(controls.places_of(toolpath)),
         controls.columns(controls.siemens(text, radius=RADIUS_MM)),
     )
     assert controls.difference(ours, theirs) is None, (ours, theirs)
@@ -92,7 +91,7 @@ def test_drawn_contours_are_the_same_in_both_readings_or_refused(bends, side, co
         return
     text, toolpath = read(program)
     ours, theirs = (
-        controls.columns(places(toolpath)),
+        controls.columns(controls.places_of(toolpath)),
         controls.columns(controls.siemens(text, radius=RADIUS_MM)),
     )
     assert controls.difference(ours, theirs) is None, (ours, theirs)
@@ -187,7 +186,7 @@ def test_heidenhain_rounds_compensated_contours():
         "heidenhain",
     )
     ours, theirs = (
-        controls.columns(places(toolpath)),
+        controls.columns(controls.places_of(toolpath)),
         controls.columns(controls.heidenhain(text, radius=RADIUS_MM)),
     )
     assert controls.difference(ours, theirs) is None, (ours, theirs)

@@ -101,8 +101,6 @@ def _around(one, other, side, radius, corners):
     if abs(turned) < SMOOTH_RAD:
         return [left]
     if turned > 0:
-        if corners == "square":
-            return [left, *_square(left, a, reached, c, radius), *([reached] if other[3] else [])]
         met = _common(one, other, side, radius)
         if corners == "meeting" and math.degrees(turned) <= MEETING_DEG:
             return [left, min(met, key=lambda z: abs(z - corner)), reached]
@@ -113,19 +111,11 @@ def _around(one, other, side, radius, corners):
     return [min(met, key=lambda z: abs(z - corner))]
 
 
-def _square(left, a, reached, c, radius):
-    """Return the points of a Fanuc's way around an outside corner."""
-    turned = abs(bend(a, c))
-    if turned <= math.pi / 2:
-        return [left + radius * math.tan(turned / 2) * a]
-    return [left + radius * a, reached - radius * c]
-
-
 def tool_path(elements, side, radius, corners="arc", roundings=None):
     """Return the tool's centre beside a contour: its start, and what follows up to its end; of arcs the ends.
 
-    ``elements`` are those of the contour without what leads in and out; ``corners`` is ``"arc"`` (G450),
-    ``"meeting"`` (G451) or ``"square"`` (Fanuc).
+    ``elements`` are those of the contour without what leads in and out; ``corners`` is ``"arc"`` (G450)
+    or ``"meeting"`` (G451).
     """
     made = rounded(elements, roundings or [None] * len(elements))
     places = [made[0][0] + side * radius * 1j * direction(made[0], at_end=False)]

@@ -23,6 +23,22 @@ class Unknown(Exception):  # noqa: N818
     """Something that is not read here."""
 
 
+def places_of(toolpath):
+    """Return the programmed places of a reading: of an arc the end alone, of what is not known None."""
+    arc, at, known = toolpath.arc, toolpath.position_mm, toolpath.known
+    rows = [
+        k
+        for k in range(1, len(arc))
+        if not toolpath.machine[k]
+        and (arc[k] < 0 or k + 1 == len(arc) or arc[k + 1] != arc[k])
+        and (arc[k] >= 0 or (at[k] != at[k - 1]).any() or (known[k] != known[k - 1]).any() or known[k].all())
+    ]
+    return [
+        tuple(float(p) if is_known else None for p, is_known in zip(at[k], toolpath.known[k], strict=True))
+        for k in rows
+    ]
+
+
 def columns(places):
     """Return (X, Y, lowest Z, highest Z, last Z) for each row of places above each other; None is unknown."""
     found = []

@@ -8,12 +8,11 @@ import pytest
 
 from gcode2krl import read_gcode, set_targets
 from gcode2krl.report.corner_marks import corners_apart
-from gcode2krl.report.corner_search import smooth, worst_corner
 from gcode2krl.report.drawing import MOST_POINTS, intervals, line_ticks, thin, thin_path
 from gcode2krl.report.figures import save_figures
 from gcode2krl.report.joints import joints_figure
 from gcode2krl.report.kinematics import kinematics_figure
-from gcode2krl.report.path import path_figure, speed_share
+from gcode2krl.report.path import path_figure, smooth, speed_share, worst_corner
 from gcode2krl.tables import Joints, Motion
 from tests.conftest import ROOT
 from tests.report.scenes import (

@@ -327,6 +327,55 @@ LAYOUTS = (
         ".txt",
     ),
     Layout(
+        "Leica, stamps with an apostrophe",
+        lambda: text(
+            ["X  [mm]", "Y  [mm]", "Z  [mm]", *(f"Q{k} " for k in range(4)), "Time Stamp", "Delete"],
+            [
+                *P.T,
+                *QUATERNION[:, [3, 0, 1, 2]].T,
+                [f"'{stamp.replace(',', '.')}" for stamp in stamps("german")],
+                [""] * len(TIME_S),
+            ],
+        ),
+        ("xyz",),
+    ),
+    Layout(
+        "EGM messages, flattened",
+        lambda: text(
+            [
+                "header.seqno",
+                "header.tm",
+                *numbered("feedBack.joints.joints[{}]", 0),
+                *numbered("planned.joints.joints[{}]", 0),
+            ],
+            [[str(k) for k in range(len(TIME_S))], np.round(1e3 * TIME_S + 1e6), *Q.T, *Q.T],
+        ),
+        ("q_act", "q_cmd"),
+    ),
+    Layout(
+        "LabVIEW measurement file",
+        lambda: text(
+            ["X_Value", *numbered("A{}"), "Fx", "Fy", "Fz", "Comment"],
+            [TIME_S, *Q.T, *F.T, [""] * len(TIME_S)],
+            "\t",
+            ",",
+            above="LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\n***End_of_Header***\t\n"
+            "\t\nChannels\t9\n***End_of_Header***\n",
+        ),
+        ("q_act", "force"),
+        ".lvm",
+    ),
+    Layout(
+        "motion capture, a head of four lines",
+        lambda: text(
+            ["Frame", "Time (Seconds)", "X", "Y", "Z"],
+            [[str(k) for k in range(len(TIME_S))], TIME_S, *P.T],
+            above="Format Version,1.23,Take Name,run 1,Length Units,Millimeters\n\n"
+            ",Type,Marker,Marker,Marker\n,Name,tcp,tcp,tcp\n,,Position,Position,Position\n",
+        ),
+        ("xyz",),
+    ),
+    Layout(
         "2 kHz or 2 Hz",
         lambda: text(["clock", *numbered("Axis{}")], [0.5 * np.arange(len(TIME_S)), *Q.T]),
         ("q_act",),

@@ -1,5 +1,7 @@
 """Broken and random files: a run, or one clear error that names the file; never another exception."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -32,6 +34,34 @@ HEADS = (
     b"t_s,x_mm,y_mm,z_mm\n",
     b"\xef\xbb\xbft_s,",
     b"IPOC,RIst_X\n",
+)
+WORDS = ("", "nan", "inf", "-1e308", "abc", "1,5", "1e999", '"', "\x00", "9" * 400, "é", "-0", "\t")
+KEYS = (
+    "cell",
+    "started",
+    "angles",
+    "mode",
+    "override_percent",
+    "frames",
+    "files",
+    "files.scan",
+    "clocks.force_s",
+    "noise",
+    "a.b",
+)
+VALUES = (
+    "-1",
+    "1e308",
+    "nan",
+    "true",
+    '"text"',
+    "[]",
+    "{}",
+    '"../../../etc"',
+    '"."',
+    "9" * 20,
+    "1979-05-27",
+    '"\\u0000"',
 )
 QUIET = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -75,6 +105,42 @@ def good(tmp_path_factory):
     (place / "run.toml").write_text('angles = "absolute"\n[frames]\ntracker = "base"\n', encoding="utf-8")
     files["run.toml"] = place / "run.toml"
     return {name: file.read_bytes() for name, file in files.items()}
+
+
+@QUIET
+@given(key=st.sampled_from(KEYS), value=st.sampled_from(VALUES), above=st.booleans())
+def test_odd_values_in_the_head(tmp_path_factory, key, value, above):
+    folder = maker.run_folder(tmp_path_factory.mktemp("fuzz") / "run")
+    lines = ['angles = "absolute"', "[frames]", 'tracker = "base"']
+    lines.insert(0 if above else 3, f"{key} = {value}")
+    (folder / "run.toml").write_text("\n".join(lines), encoding="utf-8")
+    load_or_refuse(folder)
+
+
+@QUIET
+@given(data=st.data(), name=st.sampled_from(["controller.csv", "rsi.log", "a_KRCIpo.dat", "scan.csv"]))
+def test_odd_words_in_the_cells(tmp_path_factory, good, data, name):
+    words = re.split(r"([,\n\" ])", good[name].decode("utf-8"))
+    for _ in range(data.draw(st.integers(1, 5))):
+        words[data.draw(st.integers(0, len(words) - 1))] = data.draw(st.sampled_from(WORDS))
+    folder = maker.run_folder(tmp_path_factory.mktemp("fuzz") / "run")
+    if name.endswith(".dat"):
+        (folder / "a_KRCIpo.r64").write_bytes(good["a_KRCIpo.r64"])
+    (folder / name).write_bytes("".join(words).encode(data.draw(st.sampled_from(["utf-8", "utf-16"]))))
+    load_or_refuse(folder)
+
+
+@QUIET
+@given(st.data())
+def test_numbers_in_the_footer_of_a_table(tmp_path_factory, good, data):
+    table = bytearray(good["tracker.parquet"])
+    footer = len(table) - 8 - int.from_bytes(table[-8:-4], "little")
+    for _ in range(data.draw(st.integers(1, 3))):
+        at = data.draw(st.integers(footer, len(table) - 5))
+        table[at : at + 1] = data.draw(st.sampled_from([b"\xff", b"\x80", b"\x00", b"\x7f", b"\xfe"]))
+    folder = maker.run_folder(tmp_path_factory.mktemp("fuzz") / "run")
+    (folder / "tracker.parquet").write_bytes(bytes(table))
+    load_or_refuse(folder)
 
 
 @QUIET

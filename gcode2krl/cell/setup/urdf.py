@@ -124,10 +124,10 @@ def _properties(root: ElementTree.Element) -> dict[str, float]:
 
 def _masses(root: ElementTree.Element, values: Mapping[str, float]) -> dict[str, float]:
     """Return the masses that the links' inertials state, in kg."""
-    found = {_plain(link.get("name", "")): link.find("inertial/mass") for link in root.iter("link")}
+    masses = {_plain(link.get("name", "")): link.find("inertial/mass") for link in root.iter("link")}
     return {
         name: round(_number(mass.get("value", ""), values), 3)
-        for name, mass in found.items()
+        for name, mass in masses.items()
         if mass is not None
     }
 
