@@ -12,6 +12,7 @@ from pathlib import Path
 import tomli_w
 
 from gcode2krl.cli.main import _run
+from gcode2krl.errors import Gcode2KrlError
 from tests.cell.sound_cells import MILL
 
 HEAD = "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS8000 M3\nG0 X10 Y10 Z20\n"
@@ -47,6 +48,16 @@ class Case:
     remedies: tuple[dict, ...]
     then: tuple[str, ...] = ()
     """Errors that are next, in the open: where a remedy leads to another finding."""
+
+
+CALLS = {}
+"""Functions of the Python interface that no command reaches alike: ``call NAME WORD…``."""
+
+
+def call(function):
+    """Make a function a step of `words`."""
+    CALLS[function.__name__] = function
+    return function
 
 
 def case(wrong, *remedies, then=()):
@@ -90,6 +101,9 @@ def _ran(command, files):
             for name, content in files:
                 Path(name).parent.mkdir(parents=True, exist_ok=True)
                 Path(name).write_bytes(content)
+            if command.startswith("call "):
+                name, *words = command.split()[1:]
+                return *_called(CALLS[name], words), files
             out, err = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = _run([*command.split(), "--json"])
@@ -98,6 +112,14 @@ def _ran(command, files):
             return code, tuple(map(tuple_of, record["issues"])), tuple((p.as_posix(), p.read_bytes()) for p in paths)
         finally:
             os.chdir(here)
+
+
+def _called(function, words):
+    try:
+        issues = function(*words) or ()
+    except Gcode2KrlError as error:
+        return error.exit_code, tuple(map(tuple_of, error.issues))
+    return 0, tuple(map(tuple_of, issues))
 
 
 def changed(files, edits):
@@ -118,7 +140,9 @@ def changed(files, edits):
 
 
 def tuple_of(issue):
-    return issue["severity"], issue["code"], issue["line"], issue["message"], issue["remedy"]
+    """Return what is asked of a finding, of an `Issue` or of one in a record."""
+    get = issue.get if isinstance(issue, dict) else functools.partial(getattr, issue)
+    return tuple(get(name) for name in ("severity", "code", "line", "message", "remedy"))
 
 
 def outcome(state):

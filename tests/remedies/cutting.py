@@ -1,0 +1,133 @@
+"""Remedies of what is said of a cut: force, deflection, stock, chatter, restart, compensation."""
+
+from gcode2krl.cell.sections import VIRTUAL_JOINTS
+from tests.remedies.bench import BASE, DRY, MILL, PREDICT, WET, case, laid
+
+LIGHT = {"Ktc": 200.0, "Krc": 60.0, "Kac": 30.0, "Kte": 2.0, "Kre": 2.0, "Kae": 0.5}
+STATE = laid(
+    BASE,
+    {
+        "words": WET,
+        "cell.toml": {
+            "material": {"linear_edge": LIGHT},
+            "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]], "resolution_mm": 1.0},
+        },
+    },
+)
+STEEL = {"Ktc": 2500.0, "Krc": 1000.0, "Kac": 500.0, "Kte": 40.0, "Kre": 40.0, "Kae": 5.0}
+
+
+def tool(**keys):
+    return {"cell.toml": {"tool": {"1": keys}}}
+
+
+def stock(**keys):
+    return {"cell.toml": {"stock": keys}}
+
+
+def machine(**sections):
+    return {"cell.toml": sections}
+
+
+STATED = {name: {"k_c": 2e9, "k_b": 2e9, "k_a": 2e9} for name in VIRTUAL_JOINTS}
+OWN_ROBOT = {
+    "model": None,
+    "geometry": {"a1_mm": 330.0, "a2_mm": -115.0, "c1_mm": 645.0, "c2_mm": 1150.0, "c3_mm": 1220.0, "c4_mm": 215.0},
+    "limits": {"q_deg": [[-185.0, 185.0], [-140.0, -5.0], [-120.0, 155.0], [-350.0, 350.0], [-122.5, 122.5], [-350.0, 350.0]]},
+}
+DEEP = "G1 X-20 F3000\nZ-8\nX100 F1500"
+SHALLOW = "G1 X-20 F3000\nZ-.3\nX100 F600"
+CASES = {
+    "below-table": case({"cut": "G1 Z-80 F300"}, {"cut": "G1 Z-2 F300"}),
+    "chip-thick": case({"cut": "G1 Z-1 F300\nX70 F8000"}, {"cut": "G1 Z-1 F300\nX70 F2000"}, {"cut": "G1 Z-1 F300\nS18000\nX70 F8000"}),
+    "chip-thin": case({"cut": "G1 Z-1 F300\nS18000\nX70 F50"}, {"cut": "G1 Z-1 F600\nS18000\nX70 F3000"}),
+    "deflection-high": case({"cut": DEEP, **machine(material={"linear_edge": STEEL})}, {"cut": SHALLOW}, then="payload"),
+    "depth-limit": case({"cut": DEEP, **tool(max_depth_mm=3.0)}, {"cut": "G1 Z-2 F300\nX70 F900\nX10\nZ-4 F300\nX70 F900"}),
+    "drill-sideways": case({**tool(kind="drill", teeth=2), "cut": DEEP}, tool(kind="flat"), {"cut": "G1 Z-8 F300"}),
+    "feed-per-tooth": case({"head": ("S8000", "S80"), "cut": "G1 Z-1 F300\nX70 F1500"}, {"head": ("S80 ", "S8000 ")}),
+    "force-absurd": case(
+        {**machine(material={"linear_edge": STEEL | {"Ktc": 29000.0, "Kte": 1900.0}}), "head": ("S8000", "S80"), "cut": DEEP},
+        {**machine(material={"linear_edge": LIGHT}), "head": ("S80 ", "S8000 ")},
+    ),
+    "force-high": case({"cut": DEEP, **machine(limits={"force_N": 40.0})}, {"cut": SHALLOW}, machine(limits={"force_N": 9000.0})),
+    "force-limit": case({"cut": DEEP, **tool(max_force_N=40.0)}, {"cut": SHALLOW}),
+    "force-unmeasured": case(
+        {"cut": DEEP, **machine(material={"measured_f_z_mm": [0.1, 0.125]})},
+        {"cut": "G1 X-20 F3000\nZ-8\nX100 F2700"},
+    ),
+    "holder-below-top": case(
+        {"cut": "G1 Z-38 F300\nX70", "cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]}, "tool": {"1": {"length_mm": 36.0}}}},
+        tool(stick_out_mm=60.0, holder_diameter_mm=40.0, length_mm=120.0, flute_length_mm=40.0),
+        tool(length_mm=120.0),
+        then="shank-in-stock",
+    ),
+    "holder-in-stock": case(
+        {"cut": "G1 Z-30 F300\nX70", "cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]}, "tool": {"1": {"stick_out_mm": 25.0, "holder_diameter_mm": 40.0, "flute_length_mm": 25.0}}}},
+        tool(stick_out_mm=40.0, flute_length_mm=32.0),
+        {"cut": "G1 Z-20 F300\nX70"},
+    ),
+    "shank-in-stock": case(
+        {"cut": "G1 Z-40 F300\nX70", "cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]}, "tool": {"1": {"flute_length_mm": 20.0, "stick_out_mm": 60.0, "holder_diameter_mm": 40.0}}}},
+        tool(flute_length_mm=45.0),
+        {"cut": "G1 Z-18 F300\nX70"},
+    ),
+    "payload": case({"head": ("S8000", "S80"), "cut": DEEP}, {"head": ("S80 ", "S8000 ")}),
+    "torque-high": case({"head": ("S8000", "S80"), "cut": DEEP}, {"head": ("S80 ", "S8000 ")}),
+    "spindle-power": case({"cut": DEEP, **machine(spindle={"max_power_W": 100.0})}, {"cut": SHALLOW}),
+    "spindle-torque": case({"cut": DEEP, **machine(spindle={"max_torque_Nm": 0.2})}, {"cut": SHALLOW}),
+    "plunge": case({"cut": "G1 Z-4 F300\nX70", **tool(centre_cutting=False)}, {"cut": "G1 Z0 F300\nX70 Z-4\nX10"}, {"cut": "G1 X-20 F300\nZ-4\nX70"}, tool(centre_cutting=True)),
+    "plunge-fast": case({"cut": "G1 Z-4 F9000\nX70 F1500"}, {"cut": "G1 Z-4 F300\nX70 F1500"}, {"cut": "G1 Z0 F1500\nX70 Z-4\nX10"}),
+    "plunge-wide": case(
+        {"cut": "G1 Z-2 F300\nX70", **tool(diameter_mm=50.0)},
+        {"cut": "G1 X-40 F300\nZ-2\nX70"},
+        {"cut": "G1 Z0 F300\nX70 Z-2"},
+        tool(centre_cutting=True),
+    ),
+    "rapid-in-stock": case({"cut": "G1 Z-4 F300\nX60\nG0 X20 Y30"}, {"cut": "G1 Z-4 F300\nX60\nG0 Z5\nX20 Y30"}, {"cut": "G1 Z-4 F300\nX60\nG1 X20 Y30"}),
+    "stock-guessed": case({"cell.toml": {"stock": None}}, stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]])),
+    "stock-large": case(
+        {"cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -10.0], [5000.0, 5000.0, 0.0]], "resolution_mm": None}, "tool": {"1": {"diameter_mm": 0.5}}}},
+        stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]),
+        stock(resolution_mm=2.0),
+    ),
+    "stock-resolution": case({**stock(resolution_mm=0.01, box_mm=[[0.0, 0.0, -10.0], [400.0, 400.0, 0.0]])}, stock(resolution_mm=1.0), stock(box_mm=[[9.0, 9.0, -10.0], [20.0, 20.0, 0.0]])),
+    "stock-underside": case(
+        {"cut": "G1 Z-10.4 F300\nX70"}, {"cut": "G1 Z-9 F300\nX70"}, stock(through_mm=0.5)
+    ),
+    "stock-untouched": case(stock(box_mm=[[200.0, 200.0, -10.0], [280.0, 240.0, 0.0]]), stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]])),
+
+    "no-deflection": case(
+        {"words": WET + " --compensate offline --no-forces"}, {"words": WET + " --compensate offline"},
+        then=("compensation-unsure", "compensation-large"),
+    ),
+    "compensation-twice": case(
+        {"words": WET + " --compensate offline --online RSI", **machine(online={"link": {"address": "192.168.7.3"}})},
+        {"words": WET + " --online RSI"},
+        {"words": WET + " --compensate offline"},
+        then=("compensation-unsure", "compensation-large"),
+    ),
+    "compensation-unsure": case(
+        {"words": WET + " --compensate offline", "cut": SHALLOW},
+        machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED}, material={"sure": "verified", "source": "a slot", "relative_band": 0.05}),
+    ),
+    "stiffness-estimated": case({}, machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED})),
+    "stiffness-unknown": case(
+        {"cell.toml": {"robot": OWN_ROBOT}},
+        {"cell.toml": {"robot": {"payload": {"mass_kg": 120.0, "reach_mm": 2701.0}}}},
+    ),
+    "near-mode": case({"head": ("S8000", "S1200"), "cut": "G1 Z-1 F100\nX70", **machine(compliance={"modes_hz": [20.0]})}, {"head": ("S1200", "S1500")}),
+    # going on in the middle
+    "restart-line": case({"words": WET + " --from-line 3"}, {"words": WET + " --from-line 7"}),
+
+    "restart-stock-unknown": case(
+        {"words": WET + " --from-line 8", "cell.toml": {"material": None}}, {"cell.toml": {"material": {"model": "AW-2017A"}}}
+    ),
+    "restart-in-stock": case(
+        {"words": WET + " --from-line 11", "cut": "G64 P3\nG1 Z-5 F300\nX60 F600\nY30\nX20"},
+        {"words": WET + " --from-line 6"},
+    ),
+    "restart-line-before": case(
+        {"words": WET + " --from-line 11", "cut": "G64 P3\nG1 X-20 F3000\nZ-5\nX60 F600\nY30\nX20"},
+        {"cut": "G64 P0.01\nG1 X-20 F3000\nZ-5\nX60 F600\nY30\nX20"},
+    ),
+}
