@@ -38,6 +38,8 @@ The step ``change`` among them edits files as ``change`` says: a pair is old and
 
 
 GONE = object()
+SPACE = "~~"
+"""A space within a word of a command."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Case:
     remedies: tuple[dict, ...]
     then: tuple[str, ...] = ()
     """Errors that are next, in the open: where a remedy leads to another finding."""
+    says: str = ""
+    """Words by which the finding is told from others of its code."""
 
 
 CALLS = {}
@@ -60,8 +64,8 @@ def call(function):
     return function
 
 
-def case(wrong, *remedies, then=()):
-    return Case(wrong, remedies, (then,) if isinstance(then, str) else tuple(then))
+def case(wrong, *remedies, then=(), says=""):
+    return Case(wrong, remedies, (then,) if isinstance(then, str) else tuple(then), says)
 
 
 def laid(state, edit):
@@ -106,7 +110,7 @@ def _ran(command, files):
                 return *_called(CALLS[name], words), files
             out, err = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-                code = _run([*command.split(), "--json"])
+                code = _run([*(word.replace(SPACE, " ") for word in command.split()), "--json"])
             record = json.loads(out.getvalue())
             paths = sorted(path for path in Path().rglob("*") if path.is_file())
             return code, tuple(map(tuple_of, record["issues"])), tuple((p.as_posix(), p.read_bytes()) for p in paths)
