@@ -107,15 +107,20 @@ def _ran(command, files):
                 Path(name).write_bytes(content)
             if command.startswith("call "):
                 name, *words = command.split()[1:]
-                return *_called(CALLS[name], words), files
+                result = _called(CALLS[name], words)
+                return *result, _files_here()
             out, err = io.StringIO(), io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = _run([*(word.replace(SPACE, " ") for word in command.split()), "--json"])
             record = json.loads(out.getvalue())
-            paths = sorted(path for path in Path().rglob("*") if path.is_file())
-            return code, tuple(map(tuple_of, record["issues"])), tuple((p.as_posix(), p.read_bytes()) for p in paths)
+            return code, tuple(map(tuple_of, record["issues"])), _files_here()
         finally:
             os.chdir(here)
+
+
+def _files_here():
+    paths = sorted(path for path in Path().rglob("*") if path.is_file())
+    return tuple((path.as_posix(), path.read_bytes()) for path in paths)
 
 
 def _called(function, words):

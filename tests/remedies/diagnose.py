@@ -1,0 +1,75 @@
+"""Remedies of what `diagnose` and `online replay` say of runs beside a prediction."""
+
+import numpy as np
+
+from gcode2krl import Prediction, load_cell
+from gcode2krl.gap.tell.instruments import issues_of
+from tests.gap.constructed import noise
+from tests.gap.test_instruments import SIGMA, judgement, rough
+from tests.online.test_replay import HEAD as REPLAYED
+from tests.online.test_replay import write_run
+from tests.remedies.bench import BASE, PREDICT, call, case, laid
+from tests.remedies.cutting import STATE as CUT
+from tests.runs import maker
+
+STATE = laid(CUT, {"words": "", "cut": "G1 X-20 F3000\nZ-2\nX60 F1500\nY20\nX10"})
+
+
+@call
+def drive(*left_out):
+    """Write the run of a prediction: drives 20 ms late and a noise; columns of some beginnings are left out."""
+    made = Prediction.load("prediction")
+    time_s, q = made.motion.time_s, np.degrees(made.joints.q_rad)
+    rng = np.random.default_rng(5)
+    late = np.stack([np.interp(time_s - 0.02, time_s, column) for column in q.T], axis=1)
+    act = late + rng.normal(0.0, 3e-4, q.shape)
+    columns = {"t_s": time_s + (1.7e9 if "clock" in left_out else 0.0)}
+    columns |= {f"q{k + 1}_cmd_deg": q[:, k] for k in range(6)} | {f"q{k + 1}_act_deg": act[:, k] for k in range(6)}
+    columns |= {f"i{k + 1}_A": 1.0 + rng.normal(0.0, 0.1, len(q)) for k in range(6)}
+    kept = {name: values for name, values in columns.items() if not any(word in name for word in left_out)}
+    from pathlib import Path
+
+    head = 'program = "part.nc"\n'
+    maker.run_folder(Path("run"), head, controller=kept)
+
+
+@call
+def instruments(what):
+    """Judge a signal whose noise, steps or bursts were made up."""
+    found = {
+        "loud": lambda: judgement(8.0 * rough(1), 8.0 * rough(2), declared_sigma=1.0),
+        "stated": lambda: judgement(rough(1), rough(2), declared_sigma=SIGMA),
+        "steps": lambda: judgement(10.0 * np.round(rough(1) / 10.0), 10.0 * np.round(rough(2) / 10.0)),
+        "fine": lambda: judgement(rough(1), rough(2)),
+    }[what]()
+    return issues_of([found])
+
+
+@call
+def recorded(*how):
+    """Write the run that is replayed."""
+    from pathlib import Path
+
+    write_run(Path("run"), load_cell(), head=REPLAYED + ("[channels]\nrsi = true\n" if "rsi" in how else ""), gap="gap" in how)
+    if "empty" in how:
+        file = Path("run/force.csv")
+        lines = file.read_text().splitlines()
+        lines[900] = lines[900].split(",")[0] + ",,,"
+        file.write_text("\n".join(lines) + "\n")
+
+
+def words(text):
+    return {"words": text}
+
+
+assert BASE
+assert noise
+CASES = {
+    "no-runs": case(words(f"{PREDICT}; diagnose prediction"), words(f"{PREDICT}; call drive; diagnose prediction run")),
+    "nothing-compared": case(words(f"{PREDICT}; call drive q; diagnose prediction run"), words(f"{PREDICT}; call drive; diagnose prediction run")),
+    "joints-actual-alone": case(words(f"{PREDICT}; call drive _cmd; diagnose prediction run"), words(f"{PREDICT}; call drive; diagnose prediction run")),
+    "noise-above-stated": case(words("call instruments loud"), words("call instruments stated")),
+    "readings-in-steps": case(words("call instruments steps"), words("call instruments fine")),
+    "replay-corrected": case(words("call recorded rsi; online replay run"), words("call recorded; online replay run")),
+    "replay-sensor": case(words("call recorded empty; online replay run"), words("call recorded; online replay run")),
+}
