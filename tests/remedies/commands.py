@@ -3,13 +3,20 @@
 import gzip
 import io
 import re
+import tempfile
+from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 
+from gcode2krl import load_cell
 from gcode2krl.gcode.tool_table import tools_from_table
 from gcode2krl.prediction.folder import UNFINISHED
+from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_zip
+from tests.cell.setup.test_urdf import file_of, stretched
 from tests.conftest import ROOT
 from tests.remedies.bench import BASE, DRY, PREDICT, call, case
+from tests.test_external_axes import ON_TABLE, TABLE, TABLE_MACHINE
 
 STATE = BASE
 FAST = PREDICT + " --no-forces"
@@ -18,6 +25,32 @@ PART = BASE["head"] + BASE["cut"] + BASE["tail"]
 EFFECT = re.search(r"```python\n((?:(?!```).)*EFFECT = .*?)```", (ROOT / "docs/effects.md").read_text(encoding="utf-8"), re.S)[1]
 RAIL = {"kind": "rail", "axis": "y", "limits": [-500.0, 9500.0], "speed": 1200.0, "acceleration": 1500.0, "coupled": True}
 FAR = "G1 Z-1 F300\nX30\nG0 Z20\nY7000\nG1 Z-1 F300\nX10"
+
+
+TURNING = {
+    "external": {"E1": TABLE | {"follows": "tool", "limits": [-90.0, 90.0]}},
+    "machine": TABLE_MACHINE,
+    "frames": {"base": ON_TABLE},
+}
+ROUND = "G0 Z40 A0 C0\nG43.4 H1\n" + "\n".join(
+    f"G1 X{60 * np.cos(a):.4f} Y{60 * np.sin(a):.4f} Z5 A-20 C{-np.degrees(a) - 90:.4f} F2000"
+    for a in np.linspace(0.0, 1.5 * np.pi, 60)
+)
+ARM = stretched((330.0, -115.0, 645.0, 1150.0, 1220.0, 215.0))
+
+
+def xacro(joints):
+    with tempfile.TemporaryDirectory() as folder:
+        return file_of(Path(folder), joints).read_text(encoding="utf-8")
+
+
+def archive():
+    hanging = load_cell(ROOT / "examples" / "cells" / "upside_down.toml")
+    with tempfile.TemporaryDirectory() as folder:
+        return write_zip(Path(folder) / "a.zip", config_dat(hanging), machine_dat(hanging)).read_bytes()
+
+
+ARCHIVE = archive()
 
 
 @call
@@ -127,4 +160,20 @@ CASES = {
     ),
 
     "prediction-columns": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/motion.parquet": parquet}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
+    "external-limit": case(
+        {"cell.toml": TURNING, "cut": ROUND},
+        {"cell.toml": {"external": {"E1": {"limits": [-2000.0, 2000.0]}}}},
+        {"cell.toml": {"external": {"E1": {"follows": None, "position": 0.0}}}},
+        then="collision",
+    ),
+    "urdf": case(
+        {"words": "init mine.toml --controller arm.xacro --answers answers.toml", "arm.xacro": xacro(ARM[:5]), "answers.toml": ANSWERS},
+        {"arm.xacro": xacro(ARM)},
+        then="init-answer",
+    ),
+    "archive": case(
+        {"words": "init mine.toml --controller robot.zip --answers answers.toml", "robot.zip": ARCHIVE[:-60], "answers.toml": ANSWERS},
+        {"robot.zip": ARCHIVE},
+        then="init-answer",
+    ),
 }

@@ -1,7 +1,10 @@
 """Remedies of what is said of a cut: force, deflection, stock, chatter, restart, compensation."""
 
+import trimesh
+
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
-from tests.remedies.bench import BASE, DRY, MILL, PREDICT, WET, case, laid
+from tests.remedies.bench import BASE, PREDICT, WET, case, laid
+from tests.remedies.program import FIVE, A
 
 LIGHT = {"Ktc": 200.0, "Krc": 60.0, "Kac": 30.0, "Kte": 2.0, "Kre": 2.0, "Kae": 0.5}
 STATE = laid(
@@ -15,6 +18,14 @@ STATE = laid(
     },
 )
 STEEL = {"Ktc": 2500.0, "Krc": 1000.0, "Kac": 500.0, "Kte": 40.0, "Kre": 40.0, "Kae": 5.0}
+
+
+ZERO = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
+BLOCK = trimesh.creation.box(bounds=[[0, 0, -10], [80, 40, 0]])
+BOX = BLOCK.export(file_type="stl")
+SMALL = BLOCK.copy().apply_scale(1e-3).export(file_type="stl")
+OPEN = trimesh.Trimesh(BLOCK.vertices, BLOCK.faces[:-1]).export(file_type="stl")
+LOWER = trimesh.creation.box(bounds=[[0, 2, -10], [80, 18, -8]]).export(file_type="stl")
 
 
 def tool(**keys):
@@ -129,5 +140,58 @@ CASES = {
     "restart-line-before": case(
         {"words": WET + " --from-line 11", "cut": "G64 P3\nG1 X-20 F3000\nZ-5\nX60 F600\nY30\nX20"},
         {"cut": "G64 P0.01\nG1 X-20 F3000\nZ-5\nX60 F600\nY30\nX20"},
+    ),
+    "circ-left-out": case(
+        {"words": WET.replace("--pilot none", "--pilot index"), "cut": "G1 Z0.5 F300\nZ-1\nG2 X50 Y10 I20", **machine(controller={"circ": True})},
+        machine(controller={"circ": False}),
+        {"words": WET},
+    ),
+    "deflection-absurd": case(
+        {"cut": DEEP, **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": {k: {"k_c": 1e6, "k_b": 1e6, "k_a": 1e6} for k in VIRTUAL_JOINTS}})},
+        machine(compliance={"virtual_joints": STATED}),
+    ),
+    "effect-weightless": case(
+        {"words": PREDICT + " --effect gear_twist:target=A2,deg_per_kNm=0.01", **machine(robot={"model": "KR 60 HA"}, frames={"base": {"x_mm": 1300.0, "z_mm": 500.0}}, load={"mass_kg": 24.0})},
+        machine(robot={"drives": {"link_mass_kg": [100.0, 80.0, 60.0, 20.0, 10.0, 3.0]}}),
+    ),
+    "lobes": case(
+        {"cut": DEEP, **machine(compliance={"tap_modes": [{"tool": 1, "direction": x, "frequency_hz": 600.0, "damping": 0.02, "stiffness_N_mm": 300.0} for x in "xy"]})},
+        {"cut": SHALLOW},
+    ),
+    "mode-coupling": case(
+        {"cut": "G1 X-20 F3000\nZ-8\nX100 F1500", **machine(material={"linear_edge": {"Ktc": 1500.0, "Krc": 600.0, "Kac": 300.0, "Kte": 20.0, "Kre": 20.0, "Kae": 3.0}})},
+        {"cut": SHALLOW},
+        then="payload",
+    ),
+    "job-stock": case(
+        {"words": WET + " --job job.toml", "job.toml": '[stock]\nmesh = "box.stl"\n', "box.stl": BOX, **machine(work_offsets={"G54": ZERO | {"x_mm": 5.0}})},
+        machine(work_offsets={"G54": ZERO}),
+        {"job.toml": "", **machine(stock={"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]})},
+    ),
+    "stock-mesh": case(
+        {"box.stl": OPEN, "cell.toml": {"stock": {"mesh": "box.stl", "box_mm": None}}},
+        {"box.stl": BOX},
+    ),
+    "stock-unit": case(
+        {"box.stl": SMALL, "cell.toml": {"stock": {"mesh": "box.stl", "box_mm": None}}},
+        {"box.stl": BOX},
+    ),
+    "nominal-gouge": case(
+        {"words": PREDICT + " --nominal part.stl", "part.stl": BOX, "cut": DEEP, "cell.toml": {"stock": {"box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]], "resolution_mm": 0.5}}},
+        {"cut": "G1 X-20 F3000\nZ-.05\nX100"},
+        {"part.stl": LOWER},
+    ),
+    "nominal-rest": case(
+        {"words": PREDICT + " --nominal part.stl", "part.stl": LOWER, "cut": SHALLOW, "cell.toml": {"stock": {"box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]], "resolution_mm": 0.5}}},
+        {"cut": DEEP},
+    ),
+    "restart-axis": case(
+        {"cell.toml": FIVE, "words": WET + " --from-line 12", "cut": A + "G0 A0 C0\nG1 X20 Y10 Z50 F600\nG1 X21 A70 F600\nG1 X25\nG1 X30 A0\nX40"},
+        {"words": WET + " --from-line 9"},
+        then="restart-stock-unknown",
+    ),
+    "restart-arm": case(
+        {"cell.toml": {"frames": {"spin": "auto"}, "stock": {"box_mm": [[0.0, -700.0, -10.0], [400.0, 40.0, 0.0]]}}, "words": WET + " --from-line 11", "cut": "G1 Z-1 F300\nX30\nG0 Z5\nX300 Y-600\nG1 Y-700"},
+        {"cell.toml": {"frames": {"spin": 0.0}}},
     ),
 }

@@ -1,14 +1,15 @@
 """Remedies of what `diagnose` and `online replay` say of runs beside a prediction."""
 
+from pathlib import Path
+
 import numpy as np
 
 from gcode2krl import Prediction, load_cell
 from gcode2krl.gap.tell.instruments import issues_of
-from tests.gap.constructed import noise
 from tests.gap.test_instruments import SIGMA, judgement, rough
 from tests.online.test_replay import HEAD as REPLAYED
 from tests.online.test_replay import write_run
-from tests.remedies.bench import BASE, PREDICT, call, case, laid
+from tests.remedies.bench import PREDICT, call, case, laid
 from tests.remedies.cutting import STATE as CUT
 from tests.runs import maker
 
@@ -27,10 +28,7 @@ def drive(*left_out):
     columns |= {f"q{k + 1}_cmd_deg": q[:, k] for k in range(6)} | {f"q{k + 1}_act_deg": act[:, k] for k in range(6)}
     columns |= {f"i{k + 1}_A": 1.0 + rng.normal(0.0, 0.1, len(q)) for k in range(6)}
     kept = {name: values for name, values in columns.items() if not any(word in name for word in left_out)}
-    from pathlib import Path
-
-    head = 'program = "part.nc"\n'
-    maker.run_folder(Path("run"), head, controller=kept)
+    maker.run_folder(Path("run"), 'program = "part.nc"\n', controller=kept)
 
 
 @call
@@ -48,28 +46,19 @@ def instruments(what):
 @call
 def recorded(*how):
     """Write the run that is replayed."""
-    from pathlib import Path
-
     write_run(Path("run"), load_cell(), head=REPLAYED + ("[channels]\nrsi = true\n" if "rsi" in how else ""), gap="gap" in how)
-    if "empty" in how:
-        file = Path("run/force.csv")
-        lines = file.read_text().splitlines()
-        lines[900] = lines[900].split(",")[0] + ",,,"
-        file.write_text("\n".join(lines) + "\n")
 
 
 def words(text):
     return {"words": text}
 
 
-assert BASE
-assert noise
 CASES = {
-    "no-runs": case(words(f"{PREDICT}; diagnose prediction"), words(f"{PREDICT}; call drive; diagnose prediction run")),
-    "nothing-compared": case(words(f"{PREDICT}; call drive q; diagnose prediction run"), words(f"{PREDICT}; call drive; diagnose prediction run")),
-    "joints-actual-alone": case(words(f"{PREDICT}; call drive _cmd; diagnose prediction run"), words(f"{PREDICT}; call drive; diagnose prediction run")),
+    "no-runs": case(words(f"{PREDICT} --no-forces; diagnose prediction"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
+    "nothing-compared": case(words(f"{PREDICT} --no-forces; call drive q; diagnose prediction run"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
+    "joints-actual-alone": case(words(f"{PREDICT} --no-forces; call drive _cmd; diagnose prediction run"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
     "noise-above-stated": case(words("call instruments loud"), words("call instruments stated")),
     "readings-in-steps": case(words("call instruments steps"), words("call instruments fine")),
     "replay-corrected": case(words("call recorded rsi; online replay run"), words("call recorded; online replay run")),
-    "replay-sensor": case(words("call recorded empty; online replay run"), words("call recorded; online replay run")),
+    "replay-sensor": case(words("call recorded gap; online replay run"), words("call recorded; online replay run")),
 }

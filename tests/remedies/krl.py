@@ -79,8 +79,8 @@ CASES = {
     "krl-setting-changed": src(LIN, "$BASE=$NULLFRAME\r\n" + LIN),
     "krl-state-unknown": src("; line 11: M5\r\n", "HALT\r\n; line 11: M5\r\n"),
     "krl-part": case(
-        {"words": f"{DRY} --split files --max-lines 100; change; {VERIFY}", "change": {"out_002.src": GONE},
-         "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 7} Y{10 + k / 10}" for k in range(300))},
+        {"words": f"{DRY} --split files --max-lines 100; change; {VERIFY}", "change": {"OUT_002.src": GONE},
+         "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 7} Y{10 + k / 10}" for k in range(120))},
         {"words": f"{DRY} --split files --max-lines 100; {VERIFY}"},
         {"words": f"{DRY} --split files --max-lines 100; change; {DRY} --split files --max-lines 100; {VERIFY}"},
     ),

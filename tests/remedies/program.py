@@ -1,10 +1,21 @@
 """Remedies of what is said of a program and where it runs, without forces."""
 
-from tests.remedies.bench import BASE, HEAD, MILL, case
+from tests.remedies.bench import BASE, DRY, HEAD, MILL, case
 
 STATE = BASE
 FIVE = {"machine": {"kind": "head-head", "axes": ["C", "A"], "signs": [1, 1], "tcpm": True}}
 A = "G43.4 H1\n"
+LEVEL = """\
+based_on = "demonstration"
+[frames.base]
+x_mm = 1300.0
+y_mm = 0.0
+z_mm = 1400.0
+a_deg = 0.0
+b_deg = 0.0
+c_deg = 0.0
+"""
+"""At this height the forearm is level and A5 passes 0."""
 CASES = {
     # places
     "above-clearance": case(
@@ -143,9 +154,7 @@ CASES = {
         {"cut": "G1 Z-1 F300\nF9000\n" + "\n".join(f"X{10 + k / 10:.1f} Y{10 + (k % 2) / 500:.3f}" for k in range(1, 200))},
         {"options": "--simplify 0.01"},
     ),
-    "simplified": case(
-        {"cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k / 10:.1f} Y{10 + (k % 2) / 500:.3f}" for k in range(1, 40)), "options": "--simplify 0.5"},
-    ),
+
     "near": case(
         {"cell.toml": {"obstacle": [{"name": "clamp", "box_mm": [[-40.0, 0.0, -60.0], [0.0, 40.0, 60.0]]}], "collision": {"clearance_mm": 5.0}}},
         {"cell.toml": {"collision": {"clearance_mm": 0.5}}},
@@ -154,5 +163,48 @@ CASES = {
         {"cell.toml": {"obstacle": [{"name": "clamp", "box_mm": [[25.0, 0.0, -60.0], [60.0, 40.0, 10.0]]}]}},
         {"cut": "G1 Z-1 F300\nX0", "head": ("X10 Y10", "X-40 Y10")},
         {"cell.toml": {"obstacle": []}},
+    ),
+    "singularity": case(
+        {"cut": "G1 Z-1 F300\nX0 Y-200\nY200 F6000", "cell.toml": LEVEL}, {"cell.toml": LEVEL.replace("z_mm = 1400.0", "z_mm = 800.0")}
+    ),
+    "joint-speed": case(
+        {"cell.toml": FIVE, "cut": A + "G0 A0 C0\nG1 X20 Y10 Z60 F60000\nG1 A30 X21\nG0 Z80\nA0"},
+        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z60 F60\nG1 A30 X21\nG1 A0 X22\nG0 Z80"},
+    ),
+
+    "corner-undecided": case(
+        {"cut": "G64 P2\nG1 Z-1 F300\nX60 F600\nX100 Y40 F900"},
+        {"cut": "G64 P2\nG1 Z-1 F600\nX60\nX100 Y40"},
+    ),
+    "law-undecided": case(
+        {"cell.toml": FIVE, "cut": A + "G0 A0 C0\nG1 X20 Y10 Z60 F600\nG1 X30 A30\nG0 Z80\nA0"},
+        {"cell.toml": {"controller": {"law": "averages"}}},
+    ),
+    "circ": case(
+        {"cut": "G1 Z-1 F300\nG2 X50 Y10 I20", "cell.toml": {"controller": {"circ": True}}}, {"cell.toml": {"controller": {"circ": False}}}
+    ),
+    "spline": case(
+        {"cut": "G1 Z-1 F300\nF3000\n" + "\n".join(f"X{10 + k / 2:.1f} Y{10 + k * k / 500:.3f}" for k in range(1, 60)), "cell.toml": {"controller": {"spline": True}}},
+        {"cell.toml": {"controller": {"spline": False}}},
+    ),
+    "program-large": case(
+        {"cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 2}" for k in range(200)), "cell.toml": {"program": {"memory_moves": 120, "max_lines": 100}}},
+        {"options": "--split files"},
+        {"cut": "G1 Z-1 F300\nX30"},
+    ),
+    "too-long": case(
+        {"words": "predict part.nc --cell cell.toml -o prediction --no-forces --dt 0.0000001"}, {"words": "predict part.nc --cell cell.toml -o prediction --no-forces --dt 0.012"}
+    ),
+
+
+    "machine-doubtful": case(
+        {"cell.toml": {"machine": FIVE["machine"] | {"tcpm": False, "pivot_mm": 0.1}}, "cut": "G0 A10\nG1 X20 F600"},
+        {"cell.toml": {"machine": {"pivot_mm": 100.0}}},
+        says="metres",
+    ),
+    "program-memory": case(
+        {"cell.toml": {"controller": {"kss": "8.3"}, "program": {"warn_size_mb": 0.02}}, "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k / 10}" for k in range(200))},
+        {"options": "--simplify 0.01"},
+        {"cell.toml": {"program": {"warn_size_mb": 4.0}}},
     ),
 }

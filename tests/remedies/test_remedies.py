@@ -11,10 +11,10 @@ import pytest
 
 from gcode2krl.codes import all_codes
 from gcode2krl.krl.release import NEVER_RELEASED
-from tests.remedies import cell, commands, cutting, identify, krl, program, runs
+from tests.remedies import cell, commands, cutting, diagnose, identify, krl, online, program, runs
 from tests.remedies.bench import laid, outcome
 
-TABLES = (program, cell, cutting, krl, commands, runs, identify)
+TABLES = (program, cell, cutting, krl, online, commands, runs, identify, diagnose)
 CASES = [(code, table.STATE, case) for table in TABLES for code, case in table.CASES.items()]
 WITHOUT = tomllib.loads(Path(__file__).with_name("without.toml").read_text(encoding="utf-8"))
 READER = tomllib.loads((Path(__file__).parents[1] / "gcode" / "remedies.toml").read_text(encoding="utf-8"))
