@@ -224,7 +224,7 @@ def _refuse_large(largest_mm: float, source: str) -> None:
         return
     sentence = f"a correction of {largest_mm:.1f} mm is more than {MOST_CORRECTION_MM:g} mm"
     remedy = (
-        "check stiffness and forces; where forces grow with the correction, keep those of the intended path"
+        "check stiffness and forces; in Python `keeping_forces` keeps those of the intended path, as the command does"
     )
     raise RefusedError(Issue("error", "compensation-large", 0, sentence, remedy), source)
 
@@ -235,7 +235,7 @@ def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Iss
         return
     sentence = f"the targets still change by {change_mm:.4f} mm after {_MOST_ROUNDS} rounds"
     if change_mm > tolerance_mm:
-        remedy = "the forces grow with the correction: keep the forces, or take smaller cuts"
+        remedy = "take smaller cuts; in Python `keeping_forces` keeps the forces, as the command does"
         raise RefusedError(Issue("error", "compensation-unsettled", 0, sentence, remedy), source)
     yield Issue("warning", "compensation-unsettled", 0, sentence, "compare the residual with your tolerance")
 

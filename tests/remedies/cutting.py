@@ -2,8 +2,10 @@
 
 import trimesh
 
+from gcode2krl import cut, load_cell, plan_motion, read_gcode, set_targets
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
-from tests.remedies.bench import BASE, PREDICT, WET, case, laid
+from gcode2krl.cutting import mean_force
+from tests.remedies.bench import BASE, PREDICT, WET, call, case, laid
 from tests.remedies.program import FIVE, A
 
 LIGHT = {"Ktc": 200.0, "Krc": 60.0, "Kac": 30.0, "Kte": 2.0, "Kre": 2.0, "Kae": 0.5}
@@ -20,6 +22,7 @@ STATE = laid(
 STEEL = {"Ktc": 2500.0, "Krc": 1000.0, "Kac": 500.0, "Kte": 40.0, "Kre": 40.0, "Kae": 5.0}
 
 
+MEASURED = {"sure": "verified", "source": "a slot", "relative_band": 0.05}
 ZERO = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
 BLOCK = trimesh.creation.box(bounds=[[0, 0, -10], [80, 40, 0]])
 BOX = BLOCK.export(file_type="stl")
@@ -48,6 +51,22 @@ OWN_ROBOT = {
 }
 DEEP = "G1 X-20 F3000\nZ-8\nX100 F1500"
 SHALLOW = "G1 X-20 F3000\nZ-.3\nX100 F600"
+
+
+@call
+def force(a_p_mm):
+    tool = load_cell().tool[1]
+    mean_force([[0.0, 3.14]], [float(a_p_mm)], [0.1], tool.teeth, tool.diameter_mm, 0.0, list(LIGHT.values()))
+
+
+@call
+def cut_of():
+    """Remove the material of the part in Python."""
+    cell = load_cell("cell.toml")
+    path = read_gcode("part.nc", cell)
+    cut(path, plan_motion(set_targets(path, cell), cell), cell)
+
+
 CASES = {
     "below-table": case({"cut": "G1 Z-80 F300"}, {"cut": "G1 Z-2 F300"}),
     "chip-thick": case({"cut": "G1 Z-1 F300\nX70 F8000"}, {"cut": "G1 Z-1 F300\nX70 F2000"}, {"cut": "G1 Z-1 F300\nS18000\nX70 F8000"}),
@@ -194,4 +213,20 @@ CASES = {
         {"cell.toml": {"frames": {"spin": "auto"}, "stock": {"box_mm": [[0.0, -700.0, -10.0], [400.0, 40.0, 0.0]]}}, "words": WET + " --from-line 11", "cut": "G1 Z-1 F300\nX30\nG0 Z5\nX300 Y-600\nG1 Y-700"},
         {"cell.toml": {"frames": {"spin": 0.0}}},
     ),
+    "compensation-large": case(
+        {"words": WET + " --compensate offline", "cut": DEEP, **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": dict.fromkeys(VIRTUAL_JOINTS, {"k_c": 3e7, "k_b": 3e7, "k_a": 3e7})}, material=MEASURED)},
+        machine(compliance={"virtual_joints": STATED}),
+        {"cut": SHALLOW, **machine(compliance={"virtual_joints": STATED})},
+        then="compensation-unsettled",
+    ),
+    "compensation-rest": case(
+        {"words": WET + " --compensate offline", "cut": "G1 Z-1 F300\nX60 F600", **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED}, material=MEASURED)},
+        {"cut": "G1 X-20 F3000\nZ-1\nX100 F600"},
+    ),
+    "compensation-unsettled": case(
+        {"words": WET + " --compensate offline", "cut": DEEP, **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED}, material=MEASURED)},
+        {"cut": SHALLOW},
+    ),
+    "force-input": case({"words": "call force -1"}, {"words": "call force 1"}),
+    "material-missing": case({"words": "call cut_of", "cell.toml": {"material": None}}, {"cell.toml": {"material": {"model": "AW-2017A"}}}),
 }

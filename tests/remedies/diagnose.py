@@ -4,8 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
+import trimesh
+
 from gcode2krl import Prediction, load_cell
+from gcode2krl.gap.slips.air import without_cuts
 from gcode2krl.gap.tell.instruments import issues_of
+from gcode2krl.runs.scan import read_scan
+from tests.gap.test_air import _pair
 from tests.gap.test_instruments import SIGMA, judgement, rough
 from tests.online.test_replay import HEAD as REPLAYED
 from tests.online.test_replay import write_run
@@ -34,11 +39,15 @@ def drive(*left_out):
 @call
 def instruments(what):
     """Judge a signal whose noise, steps or bursts were made up."""
+    loud = rough(5, 2000)
+    loud[900:912] *= 12.0
     found = {
         "loud": lambda: judgement(8.0 * rough(1), 8.0 * rough(2), declared_sigma=1.0),
         "stated": lambda: judgement(rough(1), rough(2), declared_sigma=SIGMA),
         "steps": lambda: judgement(10.0 * np.round(rough(1) / 10.0), 10.0 * np.round(rough(2) / 10.0)),
         "fine": lambda: judgement(rough(1), rough(2)),
+        "rough": lambda: judgement(rough(6, 2000), loud),
+        "even": lambda: judgement(rough(6, 2000), rough(5, 2000)),
     }[what]()
     return issues_of([found])
 
@@ -47,6 +56,20 @@ def instruments(what):
 def recorded(*how):
     """Write the run that is replayed."""
     write_run(Path("run"), load_cell(), head=REPLAYED + ("[channels]\nrsi = true\n" if "rsi" in how else ""), gap="gap" in how)
+
+
+@call
+def air(*stated):
+    """Judge a run in air beside a prediction with forces."""
+    return without_cuts([_pair(False, {"yes": True, "no": False}[stated[0]] if stated else None)])[1]
+
+
+@call
+def scan(how):
+    """Read the scan of a part, or half of its file."""
+    content = trimesh.creation.icosphere(subdivisions=3, radius=20.0).export(file_type="ply")
+    Path("scan.ply").write_bytes(content[: len(content) // 5] if how == "half" else content)
+    read_scan("scan.ply")
 
 
 def words(text):
@@ -61,4 +84,7 @@ CASES = {
     "readings-in-steps": case(words("call instruments steps"), words("call instruments fine")),
     "replay-corrected": case(words("call recorded rsi; online replay run"), words("call recorded; online replay run")),
     "replay-sensor": case(words("call recorded gap; online replay run"), words("call recorded; online replay run")),
+    "instrument-bursts": case(words("call instruments rough"), words("call instruments even")),
+    "run-in-air": case(words("call air"), words("call air yes"), words("call air no")),
+    "scan-ply": case(words("call scan half"), words("call scan whole")),
 }

@@ -1,8 +1,13 @@
 """Remedies of what `identify` says of readings."""
 
+from dataclasses import replace
+
 from gcode2krl.compliance.sensor import read_calibration
 from tests.conftest import ROOT
-from tests.remedies.bench import BASE, PREDICT, SPACE, call, case
+from tests.remedies.bench import BASE, GONE, PREDICT, SPACE, call, case
+from tests.identify.test_controller import HEAD as HEADED
+from tests.identify.test_controller import Controller, trace_of
+from tests.identify.test_kinematics import arm_named, identify_kinematics, pose_arms, read_readings
 from tests.remedies.cutting import STATE as CUT
 from tests.remedies.runs import FORCE, csv
 
@@ -57,6 +62,24 @@ def calibration():
     read_calibration("calibration.toml")
 
 
+@call
+def poses(noise_mm):
+    """Identify poses with the noise of an instrument, or the controller's own, which have none."""
+    arm = replace(pose_arms.KR300, noise_mm=float(noise_mm))
+    readings = read_readings(pose_arms.measured(arm, 60, 3).columns())
+    return identify_kinematics(readings, arm_named(arm.name)).issues
+
+
+TURN = "G64 P0.5\nG1 X{x} Y0 F3000\nG61\nG1 X{x} Y{y}\nG4 P0.3\nG1 X100 Y0\nG4 P0.3\n"
+TURNS = HEADED + "".join(TURN.format(x=100 + size, y=size) for size in (20, 40, 80)) + "M5\nM30\n"
+STOPPED = TURNS.replace("G1 X140 Y0 F3000\n", "G61\nG1 X120 Y0 F3000\nG4 P0.3\nG64 P0.5\nG1 X140 Y0\n")
+
+
+def trace(text):
+    made = trace_of(text, Controller())
+    return csv({"t_s": made.time_s} | {f"{a}_cmd_mm": made.position_mm[:, k] for k, a in enumerate("xyz")})
+
+
 FORCES = lambda name: name[:2] in ("fx", "fy", "fz", "mx", "my", "mz")  # noqa: E731
 MOMENTS = lambda name: name[0] == "m"  # noqa: E731
 CASES = {
@@ -95,4 +118,13 @@ CASES = {
         {"run/force.csv": csv(FORCE)},
         then="not-determined",
     ),
+    "model-misfit": case({"words": "identify stiffness robot.toml", **ROBOT, "robot.csv": scaled(ROBOT["robot.csv"], lambda n: "upper_loaded_3" in n, 1.002, {4})}, ROBOT),
+    "prediction-motion": case(
+        {"words": f"{DRIVEN}; change; identify force run", "run/run.toml": 'prediction = "../prediction"\n', "run/force.csv": csv(FORCE), "change": {"prediction/motion.parquet": GONE}},
+        {"words": f"{DRIVEN}; change; {DRIVEN}; identify force run"},
+        then="not-determined",
+    ),
+    "kinematics-exact": case({"words": "call poses 0.0"}, {"words": "call poses 0.05"}),
+    "trace-sections": case({"words": "identify controller trace.csv --part p.nc", "p.nc": TURNS, "trace.csv": trace(STOPPED)}, {"trace.csv": trace(TURNS)}, then="not-determined"),
+    "law-misfit": case({"words": "identify controller trace.csv --part p.nc", "p.nc": TURNS, "trace.csv": trace(TURNS.replace("F3000", "F1500"))}, {"trace.csv": trace(TURNS)}, then="not-determined"),
 }

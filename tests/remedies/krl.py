@@ -22,6 +22,11 @@ def again(edits, write=DRY, verify=VERIFY, **state):
     )
 
 
+def limited(cell):
+    """Return the cell of a controller that holds two triggers at a time."""
+    return cell + b"\n[pilot]\nmax_active = 2\ntolerance_N = 200.0\n"
+
+
 def src(old, new):
     return again({"out.src": (old, new)})
 
@@ -107,4 +112,8 @@ CASES = {
     ),
     "rsi-ready": online("out.src", "WAIT FOR $OUT[1020]\r\n", ""),
     "rsi-version": online("out.src", 'RSI_CREATE("RSI.rsi"', 'RSI_CREATE("RSI"'),
+    "pilot-active": case(
+        {"words": f"{CARRIED}; change; {VERIFY}", "change": {"cell.toml": limited}, "cell.toml": METAL, "cut": CARRIED_CUT},
+        {"words": f"{CARRIED}; change; {CARRIED}; {VERIFY}"},
+    ),
 }

@@ -98,4 +98,8 @@ CASES = {
         {**words(SIMULATE + " --feed-scale 0.5"), "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
         words(SIMULATE),
     ),
+    "pilot-wrong": case(
+        {**words(SIMULATE + " --pilot-scale 3 --threshold-N 10"), "cut": "G1 X-20 F3000\nZ-8\nX60 F1500", "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
+        words(SIMULATE + " --threshold-N 10"),
+    ),
 }

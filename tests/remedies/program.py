@@ -1,10 +1,24 @@
 """Remedies of what is said of a program and where it runs, without forces."""
 
-from tests.remedies.bench import BASE, DRY, HEAD, MILL, case
+import io
+
+from gcode2krl import load_cell, set_targets
+from gcode2krl.chain import corner_errors
+from gcode2krl.gcode import read_stream
+from tests.remedies.bench import BASE, DRY, HEAD, MILL, call, case
 
 STATE = BASE
 FIVE = {"machine": {"kind": "head-head", "axes": ["C", "A"], "signs": [1, 1], "tcpm": True}}
 A = "G43.4 H1\n"
+@call
+def corners(tolerance_mm):
+    """Judge targets that were set with a tolerance by one of 0.05 mm."""
+    moves = "G21 T1 M6\nS9000 M3\nG0 G43 H1 Z50\nX0 Y0\nG1 Z0 F900\nX10\nY10\nX30 Y15\nG0 Z50\nM30\n"
+    cell = load_cell()
+    toolpath = read_stream(io.BytesIO(moves.encode()), "part.nc", cell)
+    return corner_errors(toolpath, set_targets(toolpath, cell, float(tolerance_mm)), cell, 0.05)[1]
+
+
 LEVEL = """\
 based_on = "demonstration"
 [frames.base]
@@ -123,11 +137,7 @@ CASES = {
         {"cell.toml": FIVE, "cut": A + "G0 A0 C0\nG1 X20 Y10 Z50 F600\nG1 X21 A90 F600", "tail": "M5\nM30\n"},
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z50 F600\nG1 X21 A60 F600"},
     ),
-    "axis-swings": case(
-        {"cell.toml": FIVE | {"frames": {"spin": "auto"}}, "cut": A + "G0 A0 C0 Z160\nG1 A70 X20 F600\nC120 X40\nA0 X41"},
-        {"cell.toml": {"machine": {"axis_step_deg": 0.5}}},
-        {"cell.toml": {"frames": {"spin": 0.0}}},
-    ),
+
     "axis-changes": case(
         {"words": "translate part.nc --cell cell.toml --pilot none -o out.src", "cell.toml": FIVE | {"material": {"model": "AW-2017A"}}, "cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 A20 X21\nG0 Z80"},
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
@@ -207,4 +217,5 @@ CASES = {
         {"options": "--simplify 0.01"},
         {"cell.toml": {"program": {"warn_size_mb": 4.0}}},
     ),
+    "corner-tolerance": case({"words": "call corners 0.5"}, {"words": "call corners 0.05"}),
 }
