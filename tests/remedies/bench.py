@@ -90,7 +90,9 @@ def files_of(state):
     files = {"part.nc": state["head"] + state["cut"] + "\n" + state["tail"]}
     files |= {name: text for name, text in state.items() if "." in name}
     return {
-        name: text if isinstance(text, bytes) else (tomli_w.dumps(text) if isinstance(text, dict) else text).encode()
+        name: text
+        if isinstance(text, bytes)
+        else (tomli_w.dumps(text) if isinstance(text, dict) else text).encode()
         for name, text in files.items()
     }
 

@@ -22,8 +22,17 @@ STATE = BASE
 FAST = PREDICT + " --no-forces"
 ANSWERS = (ROOT / "examples/cells/answers/upside_down.toml").read_text(encoding="utf-8")
 PART = BASE["head"] + BASE["cut"] + BASE["tail"]
-EFFECT = re.search(r"```python\n((?:(?!```).)*EFFECT = .*?)```", (ROOT / "docs/effects.md").read_text(encoding="utf-8"), re.S)[1]
-RAIL = {"kind": "rail", "axis": "y", "limits": [-500.0, 9500.0], "speed": 1200.0, "acceleration": 1500.0, "coupled": True}
+EFFECT = re.search(
+    r"```python\n((?:(?!```).)*EFFECT = .*?)```", (ROOT / "docs/effects.md").read_text(encoding="utf-8"), re.S
+)[1]
+RAIL = {
+    "kind": "rail",
+    "axis": "y",
+    "limits": [-500.0, 9500.0],
+    "speed": 1200.0,
+    "acceleration": 1500.0,
+    "coupled": True,
+}
 FAR = "G1 Z-1 F300\nX30\nG0 Z20\nY7000\nG1 Z-1 F300\nX10"
 
 
@@ -80,8 +89,13 @@ CASES = {
     "code-unknown": case({"words": "explain spindel-off"}, {"words": "explain spindle-off"}),
     "allow": case({"options": "--allow spindle-off:99"}, {"options": ""}),
     "dialect-unknown": case({"head": "$PART.MIN%\nG15 H1\n" + BASE["head"]}, {"head": BASE["head"]}),
-    "output-unwritable": case({"words": DRY.replace("out.src", "nowhere/out.src")}, {"nowhere/a.txt": ""}, {"words": DRY}),
-    "output-is-input": case({"words": DRY.replace("part.nc", "out.dat"), "out.dat": PART}, {"words": DRY.replace("part.nc", "out.dat").replace("out.src", "b.src")}),
+    "output-unwritable": case(
+        {"words": DRY.replace("out.src", "nowhere/out.src")}, {"nowhere/a.txt": ""}, {"words": DRY}
+    ),
+    "output-is-input": case(
+        {"words": DRY.replace("part.nc", "out.dat"), "out.dat": PART},
+        {"words": DRY.replace("part.nc", "out.dat").replace("out.src", "b.src")},
+    ),
     "output-foreign": case({"words": FAST.replace("-o prediction", "-o .")}, {"words": FAST}),
     "output-exists": case(
         {"words": "init cell.toml --answers answers.toml", "answers.toml": ANSWERS},
@@ -94,24 +108,39 @@ CASES = {
     ),
     # files
     "file-unreadable": case({"words": DRY.replace("part.nc", "prat.nc")}, {"words": DRY}),
-    "empty": case({"head": "", "cut": "", "tail": ""}, {"head": BASE["head"], "cut": BASE["cut"], "tail": BASE["tail"]}),
-    "binary-file": case({"words": DRY.replace("part.nc", "part.f3d"), "part.f3d": b"PK\0\1\2"}, {"words": DRY}),
+    "empty": case(
+        {"head": "", "cut": "", "tail": ""}, {"head": BASE["head"], "cut": BASE["cut"], "tail": BASE["tail"]}
+    ),
+    "binary-file": case(
+        {"words": DRY.replace("part.nc", "part.f3d"), "part.f3d": b"PK\0\1\2"}, {"words": DRY}
+    ),
     "gzip-damaged": case(
         {"words": DRY.replace("part.nc", "p.nc.gz"), "p.nc.gz": gzip.compress(PART.encode(), mtime=0)[:-9]},
         {"p.nc.gz": gzip.compress(PART.encode(), mtime=0)},
     ),
-    "line-ends": case({"part.nc": PART.replace("\n", "\r")}, {"part.nc": PART}, {"part.nc": PART.replace("\n", "\r\n")}),
+    "line-ends": case(
+        {"part.nc": PART.replace("\n", "\r")}, {"part.nc": PART}, {"part.nc": PART.replace("\n", "\r\n")}
+    ),
     "not-a-part": case({"head": "G92 E0\nM104 S200\n" + BASE["head"]}, {"head": BASE["head"]}),
     "other-dialect": case(
-        {"part.nc": "%_N_PART_MPF\nG71 G90 G17 G94\nT1 M6\nG54 D1\nS8000 M3\nG0 X10 Y10 Z20\nF300\nMCALL CYCLE81(10,0,2,-8)\nX20 Y10\nMCALL\nM30\n"},
+        {
+            "part.nc": "%_N_PART_MPF\nG71 G90 G17 G94\nT1 M6\nG54 D1\nS8000 M3\nG0 X10 Y10 Z20\nF300\nMCALL CYCLE81(10,0,2,-8)\nX20 Y10\nMCALL\nM30\n"
+        },
         {"options": "--dialect sinumerik"},
     ),
     "more": case({"cut": "\n".join(f"G1 X{k} $" for k in range(1200))}, {"cut": "G1 Z-1 F300\nX30"}),
     "consequences": case({"cut": "G1 A3 F100\nG1 A4"}, {"cut": "G1 Z-1 F300\nX30"}),
     # a project
-    "project-key": case({"gcode2krl.toml": "simplfy = 0.01\n"}, {"gcode2krl.toml": "simplify = 0.01\n"}, {"options": "--isolated"}),
+    "project-key": case(
+        {"gcode2krl.toml": "simplfy = 0.01\n"},
+        {"gcode2krl.toml": "simplify = 0.01\n"},
+        {"options": "--isolated"},
+    ),
     "project-options": case({"gcode2krl.toml": "tolerance = 0.05\n"}, {"options": "--isolated"}),
-    "job-key": case({"options": "--job job.toml", "job.toml": "[tool.1]\ndiameter_mm = 0\n"}, {"job.toml": "[tool.1]\ndiameter_mm = 16.0\n"}),
+    "job-key": case(
+        {"options": "--job job.toml", "job.toml": "[tool.1]\ndiameter_mm = 0\n"},
+        {"job.toml": "[tool.1]\ndiameter_mm = 16.0\n"},
+    ),
     # tools
     "tool-file": case(
         {"words": "tools import tool.tbl --cell cell.toml", "tool.tbl": "T77 P1 D6 ; 3 flute end mill\n"},
@@ -122,44 +151,99 @@ CASES = {
         {"tool.tbl": "P1 Z10 D6\n", "words": "call tool_table"}, {"tool.tbl": "T77 P1 Z10 D6\n"}
     ),
     # effects
-    "effect-wrong": case({"words": FAST + " --effect backlash:target=A9,gap_deg=0.02"}, {"words": FAST + " --effect backlash:target=A2,gap_deg=0.02"}),
-    "effect-file": case({"words": FAST + " --effects mine --effect sag:um_per_N=1", "mine/a.py": "x = 1\n"}, {"mine/a.py": EFFECT}),
-    "effects-folder": case({"words": FAST + " --effects mine/a.py --effect sag:um_per_N=1", "mine/a.py": EFFECT}, {"words": FAST + " --effects mine --effect sag:um_per_N=1"}),
+    "effect-wrong": case(
+        {"words": FAST + " --effect backlash:target=A9,gap_deg=0.02"},
+        {"words": FAST + " --effect backlash:target=A2,gap_deg=0.02"},
+    ),
+    "effect-file": case(
+        {"words": FAST + " --effects mine --effect sag:um_per_N=1", "mine/a.py": "x = 1\n"},
+        {"mine/a.py": EFFECT},
+    ),
+    "effects-folder": case(
+        {"words": FAST + " --effects mine/a.py --effect sag:um_per_N=1", "mine/a.py": EFFECT},
+        {"words": FAST + " --effects mine --effect sag:um_per_N=1"},
+    ),
     "effect-impossible": case(
         {"words": FAST + " --effect other_program"},
         {"words": FAST},
     ),
     # a prediction's folder
-    "prediction-unfinished": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/prediction.toml": UNFINISHED.decode()}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
-    "prediction-damaged": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/motion.parquet": lambda content: content[:-500]}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
-    "prediction-schema": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/prediction.toml": ("gcode2krl/prediction/", "gcode2krl/prediction/0")}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
-    "prediction-key": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/prediction.toml": ('severity = "note"', "severity = 3")}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
+    "prediction-unfinished": case(
+        {
+            "words": f"{FAST}; change; report prediction",
+            "change": {"prediction/prediction.toml": UNFINISHED.decode()},
+        },
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    ),
+    "prediction-damaged": case(
+        {
+            "words": f"{FAST}; change; report prediction",
+            "change": {"prediction/motion.parquet": lambda content: content[:-500]},
+        },
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    ),
+    "prediction-schema": case(
+        {
+            "words": f"{FAST}; change; report prediction",
+            "change": {"prediction/prediction.toml": ("gcode2krl/prediction/", "gcode2krl/prediction/0")},
+        },
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    ),
+    "prediction-key": case(
+        {
+            "words": f"{FAST}; change; report prediction",
+            "change": {"prediction/prediction.toml": ('severity = "note"', "severity = 3")},
+        },
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    ),
     "prediction-empty": case(
         {"words": f"{FAST}; call figure prediction force"},
-        {"words": f"{PREDICT}; call figure prediction force", "cell.toml": {"material": {"model": "AW-2017A"}, "stock": {"box_mm": [[0.0, 0.0, -10.0], [40.0, 20.0, 0.0]]}}},
+        {
+            "words": f"{PREDICT}; call figure prediction force",
+            "cell.toml": {
+                "material": {"model": "AW-2017A"},
+                "stock": {"box_mm": [[0.0, 0.0, -10.0], [40.0, 20.0, 0.0]]},
+            },
+        },
     ),
     # many parts
     "batch-table": case(
-        {"words": "batch parts.toml -o out --no-forces --cell cell.toml", "a/p.nc": PART, "parts.toml": '[[folder]]\npath = "a"\ncel = "cell.toml"\n'},
+        {
+            "words": "batch parts.toml -o out --no-forces --cell cell.toml",
+            "a/p.nc": PART,
+            "parts.toml": '[[folder]]\npath = "a"\ncel = "cell.toml"\n',
+        },
         {"parts.toml": '[[folder]]\npath = "a"\ncell = "cell.toml"\n'},
     ),
     "runkit-program": case(
-        {"words": f"{DRY}; runkit out.src -o kit --lift 50"}, {"words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml"}
+        {"words": f"{DRY}; runkit out.src -o kit --lift 50"},
+        {"words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml"},
     ),
     # external axes
     "external-speed": case(
-        {"cell.toml": {"external": {"E1": {k: v for k, v in RAIL.items() if k not in ("speed", "acceleration")}}}, "cut": FAR},
+        {
+            "cell.toml": {
+                "external": {"E1": {k: v for k, v in RAIL.items() if k not in ("speed", "acceleration")}}
+            },
+            "cut": FAR,
+        },
         {"cell.toml": {"external": {"E1": RAIL}}},
     ),
     "external-uncoupled": case(
-        {"cell.toml": {"external": {"E1": RAIL | {"coupled": False}}}, "cut": FAR}, {"cell.toml": {"external": {"E1": RAIL}}}
+        {"cell.toml": {"external": {"E1": RAIL | {"coupled": False}}}, "cut": FAR},
+        {"cell.toml": {"external": {"E1": RAIL}}},
     ),
     "external-moves": case(
-        {"words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml", "cell.toml": {"external": {"E1": RAIL}}},
+        {
+            "words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml",
+            "cell.toml": {"external": {"E1": RAIL}},
+        },
         {"cell.toml": {"external": {"E1": RAIL | {"position": 0.0}}}},
     ),
-
-    "prediction-columns": case({"words": f"{FAST}; change; report prediction", "change": {"prediction/motion.parquet": parquet}}, {"words": f"{FAST}; change; {FAST}; report prediction"}),
+    "prediction-columns": case(
+        {"words": f"{FAST}; change; report prediction", "change": {"prediction/motion.parquet": parquet}},
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    ),
     "external-limit": case(
         {"cell.toml": TURNING, "cut": ROUND},
         {"cell.toml": {"external": {"E1": {"limits": [-2000.0, 2000.0]}}}},
@@ -167,12 +251,20 @@ CASES = {
         then="collision",
     ),
     "urdf": case(
-        {"words": "init mine.toml --controller arm.xacro --answers answers.toml", "arm.xacro": xacro(ARM[:5]), "answers.toml": ANSWERS},
+        {
+            "words": "init mine.toml --controller arm.xacro --answers answers.toml",
+            "arm.xacro": xacro(ARM[:5]),
+            "answers.toml": ANSWERS,
+        },
         {"arm.xacro": xacro(ARM)},
         then="init-answer",
     ),
     "archive": case(
-        {"words": "init mine.toml --controller robot.zip --answers answers.toml", "robot.zip": ARCHIVE[:-60], "answers.toml": ANSWERS},
+        {
+            "words": "init mine.toml --controller robot.zip --answers answers.toml",
+            "robot.zip": ARCHIVE[:-60],
+            "answers.toml": ANSWERS,
+        },
         {"robot.zip": ARCHIVE},
         then="init-answer",
     ),

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-
 import trimesh
 
 from gcode2krl import Prediction, load_cell
@@ -18,7 +17,7 @@ from tests.remedies.bench import PREDICT, call, case, laid
 from tests.remedies.cutting import STATE as CUT
 from tests.runs import maker
 
-STATE = laid(CUT, {"words": "", "cut": "G1 X-20 F3000\nZ-2\nX60 F1500\nY20\nX10"})
+STATE = laid(CUT, {"words": "", "cut": "G1 Z-1 F900\nX16 F900\nY14"})
 
 
 @call
@@ -30,7 +29,9 @@ def drive(*left_out):
     late = np.stack([np.interp(time_s - 0.02, time_s, column) for column in q.T], axis=1)
     act = late + rng.normal(0.0, 3e-4, q.shape)
     columns = {"t_s": time_s + (1.7e9 if "clock" in left_out else 0.0)}
-    columns |= {f"q{k + 1}_cmd_deg": q[:, k] for k in range(6)} | {f"q{k + 1}_act_deg": act[:, k] for k in range(6)}
+    columns |= {f"q{k + 1}_cmd_deg": q[:, k] for k in range(6)} | {
+        f"q{k + 1}_act_deg": act[:, k] for k in range(6)
+    }
     columns |= {f"i{k + 1}_A": 1.0 + rng.normal(0.0, 0.1, len(q)) for k in range(6)}
     kept = {name: values for name, values in columns.items() if not any(word in name for word in left_out)}
     maker.run_folder(Path("run"), 'program = "part.nc"\n', controller=kept)
@@ -55,7 +56,12 @@ def instruments(what):
 @call
 def recorded(*how):
     """Write the run that is replayed."""
-    write_run(Path("run"), load_cell(), head=REPLAYED + ("[channels]\nrsi = true\n" if "rsi" in how else ""), gap="gap" in how)
+    write_run(
+        Path("run"),
+        load_cell(),
+        head=REPLAYED + ("[channels]\nrsi = true\n" if "rsi" in how else ""),
+        gap="gap" in how,
+    )
 
 
 @call
@@ -77,13 +83,26 @@ def words(text):
 
 
 CASES = {
-    "no-runs": case(words(f"{PREDICT} --no-forces; diagnose prediction"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
-    "nothing-compared": case(words(f"{PREDICT} --no-forces; call drive q; diagnose prediction run"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
-    "joints-actual-alone": case(words(f"{PREDICT} --no-forces; call drive _cmd; diagnose prediction run"), words(f"{PREDICT} --no-forces; call drive; diagnose prediction run")),
+    "no-runs": case(
+        words(f"{PREDICT} --no-forces; diagnose prediction"),
+        words(f"{PREDICT} --no-forces; call drive; diagnose prediction run"),
+    ),
+    "nothing-compared": case(
+        words(f"{PREDICT} --no-forces; call drive q; diagnose prediction run"),
+        words(f"{PREDICT} --no-forces; call drive; diagnose prediction run"),
+    ),
+    "joints-actual-alone": case(
+        words(f"{PREDICT} --no-forces; call drive _cmd; diagnose prediction run"),
+        words(f"{PREDICT} --no-forces; call drive; diagnose prediction run"),
+    ),
     "noise-above-stated": case(words("call instruments loud"), words("call instruments stated")),
     "readings-in-steps": case(words("call instruments steps"), words("call instruments fine")),
-    "replay-corrected": case(words("call recorded rsi; online replay run"), words("call recorded; online replay run")),
-    "replay-sensor": case(words("call recorded gap; online replay run"), words("call recorded; online replay run")),
+    "replay-corrected": case(
+        words("call recorded rsi; online replay run"), words("call recorded; online replay run")
+    ),
+    "replay-sensor": case(
+        words("call recorded gap; online replay run"), words("call recorded; online replay run")
+    ),
     "instrument-bursts": case(words("call instruments rough"), words("call instruments even")),
     "run-in-air": case(words("call air"), words("call air yes"), words("call air no")),
     "scan-ply": case(words("call scan half"), words("call scan whole")),

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from gcode2krl.compliance.sensor import read_calibration
 from tests.conftest import ROOT
-from tests.remedies.bench import BASE, GONE, PREDICT, SPACE, call, case
 from tests.identify.test_controller import HEAD as HEADED
 from tests.identify.test_controller import Controller, trace_of
 from tests.identify.test_kinematics import arm_named, identify_kinematics, pose_arms, read_readings
+from tests.remedies.bench import BASE, GONE, PREDICT, SPACE, call, case
 from tests.remedies.cutting import STATE as CUT
 from tests.remedies.runs import FORCE, csv
 
@@ -16,13 +16,24 @@ HOLDER, ORIENTATIONS, POSES, HEAD = (
     (FOLDER / name).read_text(encoding="utf-8")
     for name in ("holder.csv", "orientations.csv", "poses.csv", "holder.toml")
 )
+POSES = "".join(POSES.splitlines(keepends=True)[:101])
 STIFFNESS = "identify stiffness holder.toml"
 SENSOR = "identify sensor orientations.csv -o calibration.toml"
 KINEMATICS = "identify kinematics poses.csv -o geometry.toml"
-ROBOT = {"robot.toml": (FOLDER / "robot.toml").read_text(encoding="utf-8"), "robot.csv": (FOLDER / "robot.csv").read_text(encoding="utf-8")}
+ROBOT = {
+    "robot.toml": (FOLDER / "robot.toml").read_text(encoding="utf-8"),
+    "robot.csv": (FOLDER / "robot.csv").read_text(encoding="utf-8"),
+}
 DRIVEN = PREDICT
 METAL = CUT["cell.toml"]
-STATE = BASE | {"words": SENSOR, "holder.csv": HOLDER, "holder.toml": HEAD, "orientations.csv": ORIENTATIONS, "poses.csv": POSES, "cell.toml": METAL}
+STATE = BASE | {
+    "words": SENSOR,
+    "holder.csv": HOLDER,
+    "holder.toml": HEAD,
+    "orientations.csv": ORIENTATIONS,
+    "poses.csv": POSES,
+    "cell.toml": METAL,
+}
 
 
 def scaled(text, columns, factor, rows=None):
@@ -86,11 +97,19 @@ CASES = {
     "table-column": sensor(ORIENTATIONS.replace(",", ";")),
     "table-empty": sensor(""),
     "table-number": sensor(ORIENTATIONS.replace("-60,35,-70,", "-60,3a5,-70,", 1)),
-    "table-unreadable": case({"orientations.csv": b"a_deg,b_deg\n1,2,3,4\n"}, {"orientations.csv": ORIENTATIONS}),
-    "weight-sign": case({"orientations.csv": scaled(ORIENTATIONS, FORCES, -1.0)}, {"orientations.csv": ORIENTATIONS}),
+    "table-unreadable": case(
+        {"orientations.csv": b"a_deg,b_deg\n1,2,3,4\n"}, {"orientations.csv": ORIENTATIONS}
+    ),
+    "weight-sign": case(
+        {"orientations.csv": scaled(ORIENTATIONS, FORCES, -1.0)}, {"orientations.csv": ORIENTATIONS}
+    ),
     "moment-unit": sensor(scaled(ORIENTATIONS, MOMENTS, 1e-3)),
     "not-determined": sensor("\n".join(ORIENTATIONS.splitlines()[:3]) + "\n"),
-    "remaining-offset": case({"orientations.csv": "\n".join(ORIENTATIONS.splitlines()[:9]) + "\n"}, {"orientations.csv": ORIENTATIONS}, says="no remaining offset"),
+    "remaining-offset": case(
+        {"orientations.csv": "\n".join(ORIENTATIONS.splitlines()[:9]) + "\n"},
+        {"orientations.csv": ORIENTATIONS},
+        says="no remaining offset",
+    ),
     "calibration-key": case(
         {
             "words": f"{SENSOR}; change; call calibration",
@@ -100,13 +119,44 @@ CASES = {
     ),
     "table-pair": holder(("holder.toml", "[pair.holder]", "[pair.holdr]")),
     "measurement-key": holder(("holder.toml", "point_flange_mm", "point_mm")),
-    "table-change": case({"words": STIFFNESS, "holder.csv": scaled(HOLDER, lambda n: "_loaded_" in n, 1e-3)}, {"holder.csv": HOLDER}),
-    "stray-reading": case({"words": "identify stiffness robot.toml", **ROBOT, "robot.csv": scaled(ROBOT["robot.csv"], lambda n: "upper_loaded_3" in n, 1.002, {4})}, ROBOT),
-    "pair-joints": case({"words": "identify stiffness robot.toml", **ROBOT, "robot.toml": ROBOT["robot.toml"].replace('upper = "link_low"', 'upper = "arm_rear"', 1).replace('body = "sensor"', 'body = "sensor"')}, ROBOT),
-    "kinematics-order": case({"words": KINEMATICS, "poses.csv": column(POSES, "approach")}, {"words": KINEMATICS + " --no-order"}, {"poses.csv": POSES}),
-    "kinematics-outlier": case({"words": KINEMATICS}, {"poses.csv": "".join(line for k, line in enumerate(POSES.splitlines(keepends=True), 1) if k not in (35, 137))}),
-    "kinematics-rows": case({"words": KINEMATICS, "poses.csv": scaled(POSES, lambda n: n in ("x_mm", "y_mm", "z_mm"), 0.0, {7})}, {"poses.csv": POSES}),
-    "kinematics-strange": case({"words": KINEMATICS + " --robot KR" + SPACE + "3" + SPACE + "R540"}, {"words": KINEMATICS}),
+    "table-change": case(
+        {"words": STIFFNESS, "holder.csv": scaled(HOLDER, lambda n: "_loaded_" in n, 1e-3)},
+        {"holder.csv": HOLDER},
+    ),
+    "stray-reading": case(
+        {
+            "words": "identify stiffness robot.toml",
+            **ROBOT,
+            "robot.csv": scaled(ROBOT["robot.csv"], lambda n: "upper_loaded_3" in n, 1.002, {4}),
+        },
+        ROBOT,
+    ),
+    "pair-joints": case(
+        {
+            "words": "identify stiffness robot.toml",
+            **ROBOT,
+            "robot.toml": ROBOT["robot.toml"]
+            .replace('upper = "link_low"', 'upper = "arm_rear"', 1)
+            .replace('body = "sensor"', 'body = "sensor"'),
+        },
+        ROBOT,
+    ),
+    "kinematics-order": case(
+        {"words": KINEMATICS, "poses.csv": column(POSES, "approach")},
+        {"words": KINEMATICS + " --no-order"},
+        {"poses.csv": POSES},
+    ),
+    "kinematics-outlier": case(
+        {"words": KINEMATICS},
+        {"poses.csv": "".join(line for k, line in enumerate(POSES.splitlines(keepends=True), 1) if k != 35)},
+    ),
+    "kinematics-rows": case(
+        {"words": KINEMATICS, "poses.csv": scaled(POSES, lambda n: n in ("x_mm", "y_mm", "z_mm"), 0.0, {7})},
+        {"poses.csv": POSES},
+    ),
+    "kinematics-strange": case(
+        {"words": KINEMATICS + " --robot KR" + SPACE + "3" + SPACE + "R540"}, {"words": KINEMATICS}
+    ),
     "run-prediction": case(
         {"words": f"{DRIVEN}; identify force run", "run/run.toml": "", "run/force.csv": csv(FORCE)},
         {"words": f"{DRIVEN}; identify force run --prediction prediction"},
@@ -118,13 +168,37 @@ CASES = {
         {"run/force.csv": csv(FORCE)},
         then="not-determined",
     ),
-    "model-misfit": case({"words": "identify stiffness robot.toml", **ROBOT, "robot.csv": scaled(ROBOT["robot.csv"], lambda n: "upper_loaded_3" in n, 1.002, {4})}, ROBOT),
+    "model-misfit": case(
+        {
+            "words": "identify stiffness robot.toml",
+            **ROBOT,
+            "robot.csv": scaled(ROBOT["robot.csv"], lambda n: "upper_loaded_3" in n, 1.002, {4}),
+        },
+        ROBOT,
+    ),
     "prediction-motion": case(
-        {"words": f"{DRIVEN}; change; identify force run", "run/run.toml": 'prediction = "../prediction"\n', "run/force.csv": csv(FORCE), "change": {"prediction/motion.parquet": GONE}},
+        {
+            "words": f"{DRIVEN}; change; identify force run",
+            "run/run.toml": 'prediction = "../prediction"\n',
+            "run/force.csv": csv(FORCE),
+            "change": {"prediction/motion.parquet": GONE},
+        },
         {"words": f"{DRIVEN}; change; {DRIVEN}; identify force run"},
         then="not-determined",
     ),
     "kinematics-exact": case({"words": "call poses 0.0"}, {"words": "call poses 0.05"}),
-    "trace-sections": case({"words": "identify controller trace.csv --part p.nc", "p.nc": TURNS, "trace.csv": trace(STOPPED)}, {"trace.csv": trace(TURNS)}, then="not-determined"),
-    "law-misfit": case({"words": "identify controller trace.csv --part p.nc", "p.nc": TURNS, "trace.csv": trace(TURNS.replace("F3000", "F1500"))}, {"trace.csv": trace(TURNS)}, then="not-determined"),
+    "trace-sections": case(
+        {"words": "identify controller trace.csv --part p.nc", "p.nc": TURNS, "trace.csv": trace(STOPPED)},
+        {"trace.csv": trace(TURNS)},
+        then="not-determined",
+    ),
+    "law-misfit": case(
+        {
+            "words": "identify controller trace.csv --part p.nc",
+            "p.nc": TURNS,
+            "trace.csv": trace(TURNS.replace("F3000", "F1500")),
+        },
+        {"trace.csv": trace(TURNS)},
+        then="not-determined",
+    ),
 }

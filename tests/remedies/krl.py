@@ -2,7 +2,7 @@
 
 import re
 
-from tests.remedies.bench import BASE, GONE, DRY, VERIFY, WET, case, laid
+from tests.remedies.bench import BASE, DRY, GONE, VERIFY, WET, case, laid
 
 STATE = laid(BASE, {"words": f"{DRY}; change; {VERIFY}"})
 LIN = "LIN {X 30.000,Y 10.000,Z -1.000,A 0.0000,B 0.0000,C 0.0000}\r\n"
@@ -10,7 +10,14 @@ CARRIED = WET.replace("--pilot none", "--pilot index")
 ONLINE = WET.replace("--pilot none", "--pilot none --online RSI")
 METAL = {"material": {"model": "AW-2017A"}, "stock": {"box_mm": [[0.0, 0.0, -10.0], [40.0, 20.0, 0.0]]}}
 LINK = {"online": {"link": {"address": "192.168.7.3"}}}
-RAIL = {"kind": "rail", "axis": "y", "limits": [-500.0, 500.0], "speed": 1200.0, "acceleration": 1500.0, "position": 0.0}
+RAIL = {
+    "kind": "rail",
+    "axis": "y",
+    "limits": [-500.0, 500.0],
+    "speed": 1200.0,
+    "acceleration": 1500.0,
+    "position": 0.0,
+}
 CARRIED_CUT = "G1 Z0.5 F300\nZ-1\nX15 F600\nX30"
 
 
@@ -41,7 +48,9 @@ def online(file, old, new):
 
 def templated(key, value, *remedies):
     """Return the case of a statement of the cell's templates."""
-    return case({"words": DRY, "cell.toml": {"m_code": {key: value}}, "cut": f"{key}\nG1 Z-1 F300\nX30"}, *remedies)
+    return case(
+        {"words": DRY, "cell.toml": {"m_code": {key: value}}, "cut": f"{key}\nG1 Z-1 F300\nX30"}, *remedies
+    )
 
 
 CASES = {
@@ -61,18 +70,19 @@ CASES = {
         {"words": f"{DRY}; change; {DRY}; {VERIFY}"},
     ),
     "verify-cell-unknown": again(
-        {"out.src": lambda text: re.sub(rb"; cell hash: .*\r\n", b"", re.sub(rb"; options: .*\r\n", b"", text))}
+        {
+            "out.src": lambda text: re.sub(
+                rb"; cell hash: .*\r\n", b"", re.sub(rb"; options: .*\r\n", b"", text)
+            )
+        }
     ),
     "verify-external": again(
         {"out.src": ("E1 0.000", "E1 9.000")}, **{"cell.toml": {"external": {"E1": RAIL}}}
     ),
     "krl-external": again({"out.src": (",E1 0.000", "")}, **{"cell.toml": {"external": {"E1": RAIL}}}),
-
     "krl-blend-broken": src("C_DIS\r\n", "C_DIS\r\n$OUT[5]=TRUE\r\n"),
     "krl-data": again({"out.dat": ("EXT BAS", "EXT BAD")}),
-    "krl-first-motion": again(
-        {"out.src": lambda text: re.sub(rb"PTP \{[^\r]*\r\n", b"", text, count=2)}
-    ),
+    "krl-first-motion": again({"out.src": lambda text: re.sub(rb"PTP \{[^\r]*\r\n", b"", text, count=2)}),
     "krl-incomplete": src(",Z -1.000,A 0.0000,B 0.0000,C 0.0000}", "}"),
     "krl-initmov": src("BAS (#INITMOV,0 )\r\n", ""),
     "krl-malformed": src("X 30.000", "X 3O.000"),
@@ -84,19 +94,32 @@ CASES = {
     "krl-setting-changed": src(LIN, "$BASE=$NULLFRAME\r\n" + LIN),
     "krl-state-unknown": src("; line 11: M5\r\n", "HALT\r\n; line 11: M5\r\n"),
     "krl-part": case(
-        {"words": f"{DRY} --split files --max-lines 100; change; {VERIFY}", "change": {"OUT_002.src": GONE},
-         "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 7} Y{10 + k / 10}" for k in range(120))},
+        {
+            "words": f"{DRY} --split files --max-lines 100; change; {VERIFY}",
+            "change": {"OUT_002.src": GONE},
+            "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 7} Y{10 + k / 10}" for k in range(120)),
+        },
         {"words": f"{DRY} --split files --max-lines 100; {VERIFY}"},
-        {"words": f"{DRY} --split files --max-lines 100; change; {DRY} --split files --max-lines 100; {VERIFY}"},
+        {
+            "words": f"{DRY} --split files --max-lines 100; change; {DRY} --split files --max-lines 100; {VERIFY}"
+        },
     ),
-    "no-def": case({"words": f"{DRY}; verify part.nc part.nc --cell cell.toml"}, {"words": f"{DRY}; {VERIFY}"}),
+    "no-def": case(
+        {"words": f"{DRY}; verify part.nc part.nc --cell cell.toml"}, {"words": f"{DRY}; {VERIFY}"}
+    ),
     "krl-call-undeclared": src(LIN, LIN + "GRIPPER(1)\r\n"),
     "krl-line-too-long": templated("M10", "; " + "x" * 600, {"cell.toml": {"m_code": {"M10": "; x"}}}),
     "krl-unknown": src(LIN, LIN + "SWITCHON 5\r\n"),
-    "krl-name": case({"words": DRY.replace("out.src", "circ.src")}, {"words": DRY.replace("out.src", "circ_1.src")}),
+    "krl-name": case(
+        {"words": DRY.replace("out.src", "circ.src")}, {"words": DRY.replace("out.src", "circ_1.src")}
+    ),
     # the pilot force
     "pilot-checksum": piloted("out.src", "$SEN_PINT[2]=", "$SEN_PINT[2]=1"),
-    "pilot-count": again({"out.src": lambda text: re.sub(rb"TRIGGER [^\r]*\r\n", b"", text, count=1)}, CARRIED, **{"cell.toml": METAL, "cut": CARRIED_CUT}),
+    "pilot-count": again(
+        {"out.src": lambda text: re.sub(rb"TRIGGER [^\r]*\r\n", b"", text, count=1)},
+        CARRIED,
+        **{"cell.toml": METAL, "cut": CARRIED_CUT},
+    ),
     "pilot-knot": piloted("out.src", "DELAY=44 DO", "DELAY=-44 DO"),
     "pilot-window": piloted("out.src", "DELAY=44 DO", "DELAY=9999 DO"),
     "pilot-file": piloted("out.pilot.csv", "gcode2krl/pilot/1", "gcode2krl/pilot/0"),
@@ -107,13 +130,23 @@ CASES = {
     "rsi-mode": online("out.src", "#ABSOLUTE", "#RELATIVE"),
     "rsi-order": online("out.src", "GK_RSI_RET=RSI_OFF()\r\n", ""),
     "rsi-place": again(
-        {"out.src": lambda text: re.sub(rb"(?s)(INTERRUPT OFF 21.*?ENDWHILE\r\n.*?\r\n.*?\r\n)(.*?PTP[^\r]*\r\n)", rb"\2\1", text)},
-        ONLINE, **{"cell.toml": METAL | LINK, "cut": CARRIED_CUT}
+        {
+            "out.src": lambda text: re.sub(
+                rb"(?s)(INTERRUPT OFF 21.*?ENDWHILE\r\n.*?\r\n.*?\r\n)(.*?PTP[^\r]*\r\n)", rb"\2\1", text
+            )
+        },
+        ONLINE,
+        **{"cell.toml": METAL | LINK, "cut": CARRIED_CUT},
     ),
     "rsi-ready": online("out.src", "WAIT FOR $OUT[1020]\r\n", ""),
     "rsi-version": online("out.src", 'RSI_CREATE("RSI.rsi"', 'RSI_CREATE("RSI"'),
     "pilot-active": case(
-        {"words": f"{CARRIED}; change; {VERIFY}", "change": {"cell.toml": limited}, "cell.toml": METAL, "cut": CARRIED_CUT},
+        {
+            "words": f"{CARRIED}; change; {VERIFY}",
+            "change": {"cell.toml": limited},
+            "cell.toml": METAL,
+            "cut": CARRIED_CUT,
+        },
         {"words": f"{CARRIED}; change; {CARRIED}; {VERIFY}"},
     ),
 }

@@ -8,9 +8,11 @@ from gcode2krl import load_cell, write_krl
 from tests.krl.conftest import read
 from tests.krl.forces import moved, with_forces
 from tests.krl.test_pilot_program import FOOT, HEAD, noisy, predicted, sawtooth
+from tests.online.test_cli import STOCK
+from tests.online.test_twin import SLOT
 from tests.remedies.bench import BASE, WET, call, case, laid
 from tests.remedies.cutting import STATED
-from tests.remedies.krl import CARRIED, CARRIED_CUT, LINK, METAL, ONLINE
+from tests.remedies.krl import CARRIED_CUT, LINK, METAL, ONLINE
 
 SHORT = "".join(f"G1 X{1.2 * k:.1f} Y{0.3 * (k % 2):.1f}\n" for k in range(1, 60))
 LINE = "G1 Z-1 F600\nG1 X60\n"
@@ -36,7 +38,9 @@ def pilot(what, form, tolerance_N=None):
         "in_air": (LINE, lambda p: np.where(p.motion.position_mm[:, 2:] < 0.0, 100.0, 0.0) * np.ones(3)),
         "teeth": ("G1 Z-1 F600\nG1 X300 F1500\n", lambda p: sawtooth(p, 0.012, 2.4)),
     }[what]
-    return write_krl(forced(body, force, tolerance_N), "part.src", pilot=None if form == "default" else form).issues
+    return write_krl(
+        forced(body, force, tolerance_N), "part.src", pilot=None if form == "default" else form
+    ).issues
 
 
 @call
@@ -56,7 +60,9 @@ def steps(dt_s):
     cell = load_cell()
     prediction = moved(read(HEAD + LINE + FOOT, cell), cell, float(dt_s))
     inside = np.abs(prediction.motion.position_mm[:, :1] - 30.0) < 10.0
-    return write_krl(with_forces(prediction, inside * np.array([500.0, 0.0, 0.0])), "part.src", pilot="index").issues
+    return write_krl(
+        with_forces(prediction, inside * np.array([500.0, 0.0, 0.0])), "part.src", pilot="index"
+    ).issues
 
 
 def words(text):
@@ -66,40 +72,65 @@ def words(text):
 CASES = {
     # switching it in the program
     "online-tool": case({"tail": MORE, "cell.toml": {"m_code": {"M6": "HALT"}}}, {"tail": BASE["tail"]}),
-    "online-home": case({"cut": AGAIN.format("G28 X0 Y0")}, {"cut": AGAIN.format("G28 Z0")}, {"cut": CARRIED_CUT}),
+    "online-home": case(
+        {"cut": AGAIN.format("G28 X0 Y0")}, {"cut": AGAIN.format("G28 Z0")}, {"cut": CARRIED_CUT}
+    ),
     "online-halt": case({"cut": AGAIN.format("M0")}, {"cut": AGAIN.format("")}, {"cut": CARRIED_CUT}),
     "online-nothing": case({"head": ("Z20\n", "Z150\n"), "cut": "", "tail": "M5\nM30\n"}, words(WET)),
     "online-pilot": case(
-        {**words(ONLINE.replace("--pilot none", "--pilot index")), "cell.toml": {"pilot": {"index_variable": "MY_INDEX"}}},
+        {
+            **words(ONLINE.replace("--pilot none", "--pilot index")),
+            "cell.toml": {"pilot": {"index_variable": "MY_INDEX"}},
+        },
         {"cell.toml": {"pilot": {"index_variable": "$SEN_PINT[1]"}}},
         words(ONLINE),
     ),
-    "online-address": case(
-        {"cell.toml": {"online": None}}, {"cell.toml": LINK}
-    ),
+    "online-address": case({"cell.toml": {"online": None}}, {"cell.toml": LINK}),
     "rsi-index": case(
-        {**words(ONLINE.replace("--pilot none", "--pilot index")), "cell.toml": {"pilot": {"index_variable": "$SEN_PINT[21]"}, "controller": {"rsi": "3"}}},
+        {
+            **words(ONLINE.replace("--pilot none", "--pilot index")),
+            "cell.toml": {"pilot": {"index_variable": "$SEN_PINT[21]"}, "controller": {"rsi": "3"}},
+        },
         {"cell.toml": {"pilot": {"index_variable": "$SEN_PINT[3]"}}},
     ),
     # the pilot force
-    "pilot-dense": case(words("call pilot noise index 1"), words("call pilot noise index 400"), words("call pilot noise none")),
-
-    "pilot-left-out": case(words("call pilot noise default"), words("call pilot noise default 400"), words("call pilot noise none")),
-    "pilot-tolerance": case(words("call pilot murmur index"), words("call pilot murmur index 400"), words("call pilot murmur none")),
+    "pilot-dense": case(
+        words("call pilot noise index 1"), words("call pilot noise index 400"), words("call pilot noise none")
+    ),
+    "pilot-left-out": case(
+        words("call pilot noise default"),
+        words("call pilot noise default 400"),
+        words("call pilot noise none"),
+    ),
+    "pilot-tolerance": case(
+        words("call pilot murmur index"),
+        words("call pilot murmur index 400"),
+        words("call pilot murmur none"),
+    ),
     "pilot-lead": case(words("call pilot at_once index"), words("call pilot in_air index")),
     "pilot-motion": case(words("call moved_after changed"), words("call moved_after no")),
     "pilot-cycle": case(words("call steps 0.004"), words("call steps 0.012")),
     # the twin
     "nothing-judged": case(
-        {**words(SIMULATE), "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -30.0], [80.0, 40.0, -20.0]]}}},
+        {
+            **words(SIMULATE),
+            "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -30.0], [80.0, 40.0, -20.0]]}},
+        },
         {"cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
     ),
     "pilot-refused": case(
-        {**words(SIMULATE + " --feed-scale 0.5"), "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
+        {
+            **words(SIMULATE + " --feed-scale 0.5"),
+            "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}},
+        },
         words(SIMULATE),
     ),
     "pilot-wrong": case(
-        {**words(SIMULATE + " --pilot-scale 3 --threshold-N 10"), "cut": "G1 X-20 F3000\nZ-8\nX60 F1500", "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
-        words(SIMULATE + " --threshold-N 10"),
+        {
+            "words": "online simulate slot.nc --cell slot.toml --pilot-scale 1.6",
+            "slot.nc": SLOT,
+            "slot.toml": STOCK,
+        },
+        words("online simulate slot.nc --cell slot.toml"),
     ),
 }

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 
 from gcode2krl.runs import check_against, load_run
-from tests.remedies.bench import BASE, GONE, call, case
+from tests.remedies.bench import BASE, call, case
 from tests.runs import maker
 from tests.runs.test_krc_trace import data_set
 from tests.runs.test_rsi_log import log
@@ -92,42 +92,85 @@ def recorded():
 RECORDED = recorded()
 
 CASES = {
-    "run-axes": case(tracked(exchanged(without(TRACKER, "q"), ("x_mm", "y_mm"))) | {"run/controller.csv": csv(without(CONTROLLER, "x_", "y_", "z_"))}, tracked(TRACKER)),
+    "run-axes": case(
+        tracked(exchanged(without(TRACKER, "q"), ("x_mm", "y_mm")))
+        | {"run/controller.csv": csv(without(CONTROLLER, "x_", "y_", "z_"))},
+        tracked(TRACKER),
+    ),
     "run-clock": case(
         tracked(maker.tracker(offset=2.0)), {HEAD: "[clocks]\ntracker_s = 2.0\n"}, tracked(TRACKER)
     ),
-    "run-files": case({"run/controller.parquet": parquet(CONTROLLER)}, {"run/controller.parquet": None}, {HEAD: '[files]\ncontroller = "controller.csv"\n'}),
+    "run-files": case(
+        {"run/controller.parquet": parquet(CONTROLLER)},
+        {"run/controller.parquet": None},
+        {HEAD: '[files]\ncontroller = "controller.csv"\n'},
+    ),
     "run-frame": case(
-        tracked(moved(lambda p: p + [0.0, 100.0, 0.0])), tracked(TRACKER), {HEAD: '[frames]\ntracker = "sensor"\n'}
+        tracked(moved(lambda p: p + [0.0, 100.0, 0.0])),
+        tracked(TRACKER),
+        {HEAD: '[frames]\ntracker = "sensor"\n'},
     ),
-    "run-key": case({HEAD: "override = 50\n"}, {HEAD: "override_percent = 100\n"}, {HEAD: '[notes]\noverride = "50"\n'}),
+    "run-key": case(
+        {HEAD: "override = 50\n"}, {HEAD: "override_percent = 100\n"}, {HEAD: '[notes]\noverride = "50"\n'}
+    ),
     "run-override": case(HALF, {HEAD: "override_percent = 50\n"}, SEEN | logged(CONTROLLER)),
-    "run-path": case({HEAD: 'prediction = "../predicton"\n'}, {"prediction/prediction.toml": "", HEAD: 'prediction = "../prediction"\n'}),
-    "run-program": case(
-        logged(maker.controller(waypoints=OTHER)) | tracked(maker.tracker(waypoints=OTHER)), SEEN | logged(CONTROLLER)
+    "run-path": case(
+        {HEAD: 'prediction = "../predicton"\n'},
+        {"prediction/prediction.toml": "", HEAD: 'prediction = "../prediction"\n'},
     ),
-    "run-t1": case({"words": "call run fast"} | CAPPED, {HEAD: 'mode = "T1"\n'}, tracked(maker.tracker(**FAST)) | logged(maker.controller(**FAST))),
-    "run-unit": case({"run/controller.csv": csv(without(CONTROLLER, "x_", "y_", "z_"))} | tracked(moved(lambda p: p * [1e-3, 1.0, 1.0])), tracked(TRACKER)),
+    "run-program": case(
+        logged(maker.controller(waypoints=OTHER)) | tracked(maker.tracker(waypoints=OTHER)),
+        SEEN | logged(CONTROLLER),
+    ),
+    "run-t1": case(
+        {"words": "call run fast"} | CAPPED,
+        {HEAD: 'mode = "T1"\n'},
+        tracked(maker.tracker(**FAST)) | logged(maker.controller(**FAST)),
+    ),
+    "run-unit": case(
+        {"run/controller.csv": csv(without(CONTROLLER, "x_", "y_", "z_"))}
+        | tracked(moved(lambda p: p * [1e-3, 1.0, 1.0])),
+        tracked(TRACKER),
+    ),
     "trace-column": case(logged(without(CONTROLLER, "q6_")), logged(CONTROLLER)),
     "trace-columns": case(logged(exchanged(CONTROLLER, ("q2_act_deg", "q3_act_deg"))), logged(CONTROLLER)),
-    "trace-constant": case({}, logged(CONTROLLER | {f"{a}_cmd_deg": 10.0 * np.sin(T) for a in "abc"}), logged(without(CONTROLLER, "a_", "b_", "c_"))),
+    "trace-constant": case(
+        {},
+        logged(CONTROLLER | {f"{a}_cmd_deg": 10.0 * np.sin(T) for a in "abc"}),
+        logged(without(CONTROLLER, "a_", "b_", "c_")),
+    ),
     "trace-decimals": case(tracked(COARSE), SEEN),
     "trace-dropped": case(logged(CONTROLLER | {"q3_act_deg": GAPS}), logged(CONTROLLER)),
     "trace-empty": case({"words": "runs import log.csv -o run-9", "log.csv": ""}, {"log.csv": TEXT}),
     "trace-gap": case(logged(PAUSED), logged(CONTROLLER)),
     "trace-ignored": case(logged(CONTROLLER | {"temperature": T}), logged(CONTROLLER)),
     "trace-missing": case(logged(without(CONTROLLER, "x_", "y_", "z_")), logged(CONTROLLER)),
-    "trace-number": case(logged(CONTROLLER | {"q3_act_deg": [f"{v:.3f}".replace(".", ";") for v in CONTROLLER["q3_act_deg"]]}), logged(CONTROLLER)),
+    "trace-number": case(
+        logged(CONTROLLER | {"q3_act_deg": [f"{v:.3f}".replace(".", ";") for v in CONTROLLER["q3_act_deg"]]}),
+        logged(CONTROLLER),
+    ),
     "trace-overlap": case(tracked(maker.tracker(offset=60.0)), SEEN, {HEAD: "[clocks]\ntracker_s = 60.0\n"}),
     "trace-short": case(logged({k: v[:2] for k, v in CONTROLLER.items()}), logged(CONTROLLER)),
-    "trace-time": case(logged({k: np.concatenate([v, v]) for k, v in CONTROLLER.items()}), logged(CONTROLLER)),
+    "trace-time": case(
+        logged({k: np.concatenate([v, v]) for k, v in CONTROLLER.items()}), logged(CONTROLLER)
+    ),
     "trace-unit": case(tracked(TRACKER | {"t_s": TRACKER["t_s"] * 1000.0}), SEEN),
     "trace-unreadable": case(
-        {"words": "runs import log.csv -o run-9", "log.csv": "Time,Axis1,Axis2,Axis3,Axis4,Axis5,Axis6\n" + "\n".join(f"0,0{k:02d},1,5,2,5,3,5,4,5,5,5,6,5" for k in range(30))},
+        {
+            "words": "runs import log.csv -o run-9",
+            "log.csv": "Time,Axis1,Axis2,Axis3,Axis4,Axis5,Axis6\n"
+            + "\n".join(f"0,0{k:02d},1,5,2,5,3,5,4,5,5,5,6,5" for k in range(30)),
+        },
         {"log.csv": TEXT},
     ),
     "run-layout": case(
-        {"words": "runs import log.csv -o run-9", "log.csv": csv({"Time": T} | {f"Axis{k + 1}": np.radians(maker.joints_deg(maker.path(T)))[:, k] * 2 for k in range(6)})},
+        {
+            "words": "runs import log.csv -o run-9",
+            "log.csv": csv(
+                {"Time": T}
+                | {f"Axis{k + 1}": np.radians(maker.joints_deg(maker.path(T)))[:, k] * 2 for k in range(6)}
+            ),
+        },
         {"options": "--unit angle=rad"},
         {"options": "--unit angle=deg"},
         then="trace-unit",

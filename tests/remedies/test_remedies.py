@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from gcode2krl.codes import all_codes
-from gcode2krl.krl.release import NEVER_RELEASED
 from tests.remedies import cell, commands, cutting, diagnose, identify, krl, online, program, runs
 from tests.remedies.bench import laid, outcome
 
