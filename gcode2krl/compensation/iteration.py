@@ -223,7 +223,7 @@ def _refuse_large(largest_mm: float, source: str) -> None:
     if largest_mm <= MOST_CORRECTION_MM:
         return
     sentence = f"a correction of {largest_mm:.1f} mm is more than {MOST_CORRECTION_MM:g} mm"
-    remedy = "check stiffness and forces; in Python `keeping_forces` keeps those of the intended path, as the command does"
+    remedy = "check stiffness and forces; in Python `keeping_forces` keeps the forces, as the command does"
     raise RefusedError(Issue("error", "compensation-large", 0, sentence, remedy), source)
 
 

@@ -1,4 +1,4 @@
-"""A folder with a small program and its cell, the edits that spoil and mend it, and what a command says of it."""
+"""A small program and its cell, the edits that spoil and mend them, and what a command says of them."""
 
 import contextlib
 import functools

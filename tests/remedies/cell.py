@@ -3,7 +3,9 @@
 from tests.remedies.bench import BASE, DRY, MILL, WET, case, laid
 
 CONFIRM = "models confirm cell.toml --by A --yes; "
-TIMED = "$ANOUT[1]={{ '%.4f' % (rpm / spindle.max_rpm) }}\n$OUT[{{ spindle.run_cw_output }}]=TRUE\nWAIT SEC {{ spindle.start_s }}"
+TIMED = MILL["m_code"]["M3"].replace(
+    "WAIT FOR $IN[{{ spindle.at_speed_input }}]", "WAIT SEC {{ spindle.start_s }}"
+)
 OWN_ROBOT = {
     "model": None,
     "geometry": {

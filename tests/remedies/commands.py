@@ -124,7 +124,8 @@ CASES = {
     "not-a-part": case({"head": "G92 E0\nM104 S200\n" + BASE["head"]}, {"head": BASE["head"]}),
     "other-dialect": case(
         {
-            "part.nc": "%_N_PART_MPF\nG71 G90 G17 G94\nT1 M6\nG54 D1\nS8000 M3\nG0 X10 Y10 Z20\nF300\nMCALL CYCLE81(10,0,2,-8)\nX20 Y10\nMCALL\nM30\n"
+            "part.nc": "%_N_PART_MPF\nG71 G90 G17 G94\nT1 M6\nG54 D1\nS8000 M3\nG0 X10 Y10 Z20\nF300\n"
+            "MCALL CYCLE81(10,0,2,-8)\nX20 Y10\nMCALL\nM30\n"
         },
         {"options": "--dialect sinumerik"},
     ),

@@ -43,7 +43,11 @@ def machine(**sections):
     return {"cell.toml": sections}
 
 
-STATED = {name: {"k_c": 2e9, "k_b": 2e9, "k_a": 2e9} for name in VIRTUAL_JOINTS}
+def all_joints(stiffness_Nmm_rad):
+    return {name: dict.fromkeys(("k_c", "k_b", "k_a"), stiffness_Nmm_rad) for name in VIRTUAL_JOINTS}
+
+
+STATED = all_joints(2e9)
 OWN_ROBOT = {
     "model": None,
     "geometry": {
@@ -265,7 +269,7 @@ CASES = {
             **machine(
                 compliance={
                     "sensor_height_mm": 56.0,
-                    "virtual_joints": {k: {"k_c": 1e6, "k_b": 1e6, "k_a": 1e6} for k in VIRTUAL_JOINTS},
+                    "virtual_joints": all_joints(1e6),
                 }
             ),
         },
@@ -383,7 +387,7 @@ CASES = {
             **machine(
                 compliance={
                     "sensor_height_mm": 56.0,
-                    "virtual_joints": dict.fromkeys(VIRTUAL_JOINTS, {"k_c": 3e7, "k_b": 3e7, "k_a": 3e7}),
+                    "virtual_joints": all_joints(3e7),
                 },
                 material=MEASURED,
             ),

@@ -22,7 +22,7 @@ STATE = laid(CUT, {"words": "", "cut": "G1 Z-1 F900\nX16 F900\nY14"})
 
 @call
 def drive(*left_out):
-    """Write the run of a prediction: drives 20 ms late and a noise; columns of some beginnings are left out."""
+    """Write the run of a prediction, its drives 20 ms late, without the columns that have these words."""
     made = Prediction.load("prediction")
     time_s, q = made.motion.time_s, np.degrees(made.joints.q_rad)
     rng = np.random.default_rng(5)

@@ -5,6 +5,7 @@ import re
 from tests.remedies.bench import BASE, DRY, GONE, VERIFY, WET, case, laid
 
 STATE = laid(BASE, {"words": f"{DRY}; change; {VERIFY}"})
+SPLIT = f"{DRY} --split files --max-lines 100"
 LIN = "LIN {X 30.000,Y 10.000,Z -1.000,A 0.0000,B 0.0000,C 0.0000}\r\n"
 CARRIED = WET.replace("--pilot none", "--pilot index")
 ONLINE = WET.replace("--pilot none", "--pilot none --online RSI")
@@ -95,14 +96,12 @@ CASES = {
     "krl-state-unknown": src("; line 11: M5\r\n", "HALT\r\n; line 11: M5\r\n"),
     "krl-part": case(
         {
-            "words": f"{DRY} --split files --max-lines 100; change; {VERIFY}",
+            "words": f"{SPLIT}; change; {VERIFY}",
             "change": {"OUT_002.src": GONE},
             "cut": "G1 Z-1 F300\n" + "\n".join(f"X{10 + k % 7} Y{10 + k / 10}" for k in range(120)),
         },
-        {"words": f"{DRY} --split files --max-lines 100; {VERIFY}"},
-        {
-            "words": f"{DRY} --split files --max-lines 100; change; {DRY} --split files --max-lines 100; {VERIFY}"
-        },
+        {"words": f"{SPLIT}; {VERIFY}"},
+        {"words": f"{SPLIT}; change; {SPLIT}; {VERIFY}"},
     ),
     "no-def": case(
         {"words": f"{DRY}; verify part.nc part.nc --cell cell.toml"}, {"words": f"{DRY}; {VERIFY}"}

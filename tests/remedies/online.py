@@ -1,4 +1,4 @@
-"""Remedies of what is said of the pilot force, of the online compensation, and of a program begun in the middle."""
+"""Remedies of what is said of the pilot force and of the online compensation."""
 
 from dataclasses import replace
 

@@ -106,7 +106,7 @@ CASES = {
         {HEAD: '[files]\ncontroller = "controller.csv"\n'},
     ),
     "run-frame": case(
-        tracked(moved(lambda p: p + [0.0, 100.0, 0.0])),
+        tracked(moved(lambda p: p + np.array([0.0, 100.0, 0.0]))),
         tracked(TRACKER),
         {HEAD: '[frames]\ntracker = "sensor"\n'},
     ),

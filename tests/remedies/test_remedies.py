@@ -1,4 +1,4 @@
-"""Each code is caused, its remedy carried out, and the finding is gone: the program is written, or another is next.
+"""Each code is caused and its remedy carried out: the program is written, or another finding is next.
 
 A table is a module with a `STATE`, which is said to be in order, and `CASES` by code. What has no remedy that
 a person carries out in a file stands in ``without.toml`` with its reason.
