@@ -10,6 +10,7 @@ from gcode2krl.chain import Plan
 from gcode2krl.cli.loads import load_lines
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.krl.external_words import axes_words
+from gcode2krl.pose.chatter import chatter_not_judged
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.translation.quantity import band_words, quantities
 from gcode2krl.units import BYTES_PER_MB, DEG_PER_RAD, MM_PER_M, S_PER_MIN
@@ -60,13 +61,16 @@ def summary_lines(
 
 def _collisions(cell: Cell, tools: list[int], *, is_cut: bool) -> Iterator[str]:
     """Yield what was checked for collisions and what was not."""
-    scope = collision_scope(cell, tools, is_cut=is_cut)
+    scope, chatter = (
+        collision_scope(cell, tools, is_cut=is_cut),
+        chatter_not_judged(cell, tools, is_cut=is_cut),
+    )
     if scope is None:
-        yield "  not known  collision of arm, spindle and cables, and chatter, are not checked"
+        yield "  not known  collision of arm, spindle and cables" + f"; {chatter}" * bool(chatter)
         return
     yield f"  collisions none: {', '.join(scope.movers)}"
     yield f"             against {', '.join(scope.obstacles) or 'nothing that the cell states'}"
-    yield f"  not known  collision of {', '.join(scope.unchecked)}; chatter"
+    yield f"  not known  collision of {', '.join(scope.unchecked)}" + f"; {chatter}" * bool(chatter)
 
 
 def _duration(seconds: float) -> str:

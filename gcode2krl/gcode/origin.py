@@ -216,7 +216,7 @@ _FOREIGN: Final = (
     _Foreign(
         "not-a-part",
         "this is a KRL program, not G-code",
-        "`gcode2krl verify` reads KRL; what is translated is the G-code",
+        "what is translated is the G-code; `gcode2krl verify PART.src PART.nc` compares both",
         re.compile(rb"\A(?:\s*&[A-Z][^\n]*\n)*\s*(?:DEF\s+\w+\s*\(|DEFDAT\s+\w+|DEFFCT\s+\w+)", _FLAGS),
         in_comments=True,
     ),

@@ -39,6 +39,7 @@ LEAST_FOR_TERMS = 20
 """Orientations below which the ten terms are not fitted; the paper takes 27."""
 _LEAST_SPREAD = 0.05
 """Least root mean square distance of the gravity directions from a point, and from a line."""
+_MORE = "vary A, B and C, each in three steps"
 _LEAST_SINGULAR = 0.005
 """Least singular value of the ten terms over the root of the number of orientations; a full turn about every
 axis has some 0.2."""
@@ -233,13 +234,13 @@ def _with_terms(
     count = len(terms)
     if count < LEAST_FOR_TERMS:
         text = f"no remaining offset fitted: {count} orientations, {LEAST_FOR_TERMS} are needed (paper: 27)"
-        return plain, (None, None), [Issue("note", "remaining-offset", 0, text)]
+        return plain, (None, None), [Issue("note", "remaining-offset", 0, text, _MORE)]
     if np.linalg.svd(terms, compute_uv=False)[-1] < _LEAST_SINGULAR * math.sqrt(count):
         text = "no remaining offset fitted: the orientations are too similar for its ten terms"
         return (
             plain,
             (None, None),
-            [Issue("warning", "remaining-offset", 0, text, "vary A, B and C, each in three steps")],
+            [Issue("warning", "remaining-offset", 0, text, _MORE)],
         )
     added: dict[str, tuple[tuple[float, float, float], ...]] = {}
     left_out, issues = [], []
@@ -257,13 +258,12 @@ def _with_terms(
                 f"the {what} holds more than weight and offset, {_rms(residual):.3g} {unit} rms "
                 "(hose pack?): the intervals do not cover how much of it counts as weight and offset"
             )
-            issues.append(Issue("note", "remaining-offset", 0, text))
         else:
             text = (
                 f"no remaining {what} fitted: {_rms(residual):.3g} {unit} rms without, {error:.3g} {unit} at "
                 "readings left out of the fit of its ten terms"
             )
-            issues.append(Issue("note", "remaining-offset", 0, text))
+        issues.append(Issue("note", "remaining-offset", 0, text, "nothing to do: it is taken into account"))
     return plain.model_copy(update=added), (left_out[0], left_out[1]), issues
 
 

@@ -193,14 +193,15 @@ def motion_issues(
     issues += _stop_issues(chain, stops_s, profile)
     if lost_whole_s > cell.limits.lost_time_share * profile.total_s:
         issues = [replace(issue, severity="warning") for issue in issues]
-    law = cell.controller.law
-    other_law = "trapezoid" if law == "averages" else "averages"
-    other_controller = cell.controller.model_copy(update={"law": other_law})
-    other_s = plan(chain, cell.model_copy(update={"controller": other_controller})).total_s
-    if abs(other_s - profile.total_s) > 0.05 * profile.total_s:
-        sentence = f"time by law {law} {profile.total_s:.1f} s, by {other_law} {other_s:.1f} s"
-        remedy = "undecided without a trace of the controller"
-        issues.append(Issue("note", "law-undecided", 0, sentence, remedy))
+    if "controller.law" in cell.defaults:  # who states it has identified it, or answers for it
+        law = cell.controller.law
+        other_law = "trapezoid" if law == "averages" else "averages"
+        other_controller = cell.controller.model_copy(update={"law": other_law})
+        other_s = plan(chain, cell.model_copy(update={"controller": other_controller})).total_s
+        if abs(other_s - profile.total_s) > 0.05 * profile.total_s:
+            sentence = f"time by law {law} {profile.total_s:.1f} s, by {other_law} {other_s:.1f} s"
+            remedy = "`gcode2krl identify controller` writes the law of a trace into the cell"
+            issues.append(Issue("note", "law-undecided", 0, sentence, remedy))
     return tuple(issues)
 
 

@@ -6,7 +6,7 @@ leave out.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -80,6 +80,19 @@ def coupling_along(
     return Coupling(rows, index, turns, over)
 
 
+def chatter_not_judged(cell: Cell, tools: Sequence[int], *, is_cut: bool) -> str:
+    """Return the kinds of chatter that nothing is said of with these tools, "" where both are estimated."""
+    if not is_cut or not _couples(cell):
+        return "chatter"
+    tested = {mode.tool for mode in cell.compliance.tap_modes}
+    untested = [f"T{number}" for number in tools if number not in tested]
+    return f"chatter of {', '.join(untested)} (no tap test)" if untested else ""
+
+
+def _couples(cell: Cell) -> bool:
+    return not cell.external and cell.material is not None and missing_stiffness(cell) is None
+
+
 def index_band(forces: Forces, cell: Cell) -> float:
     """Return the half-width of the 90 % band of an index, relative: that of force and stiffness together."""
     return math.hypot(forces.relative_band, stiffness(cell).relative_band)
@@ -141,7 +154,7 @@ class ChatterWatch:
     def __init__(self, toolpath: Toolpath, cell: Cell) -> None:
         """Take what the motion was made from."""
         self._toolpath, self._cell = toolpath, cell
-        self._couples = not cell.external and cell.material is not None and missing_stiffness(cell) is None
+        self._couples = _couples(cell)
         self._worst: tuple[float, int, float, Motion, Floats, Forces] | None = None
         self._deep: tuple[float, int, float, float, float] | None = None
         self._tested = (
@@ -200,9 +213,10 @@ class ChatterWatch:
             index, line, band, motion, q_rad, forces = self._worst
             over = coupling_along(self._toolpath, motion, q_rad, forces, self._cell, spins=True)
             low, high = max(index * (1.0 - band), 0.0), index * (1.0 + band)
+            does = "makes" if low >= 1.0 else "may make"
             sentence = (
-                f"the cut makes the arm swing by itself: mode coupling, index {index:.1f} "
-                f"({low:.1f} to {high:.1f}, 90 %), above 1 (estimated)"
+                f"the cut {does} the arm swing by itself, as it does above 1: mode coupling, index "
+                f"{index:.1f} ({low:.1f} to {high:.1f}, 90 %; estimated)"
             )
             remedy = "cut less deep or wide, or climb instead of up-milling"
             least = over.over_spin[:, 0]

@@ -278,12 +278,14 @@ def _machine_moves(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issu
 def _spindle(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
     speed = toolpath.spindle_rad_s
     for row in _stretches(feed & (speed == 0)):
+        stopped = any(event.kind in ("spindle", "tool") for event in toolpath.events if event.row < row)
+        by_hand = "" if stopped else "; switched by hand: [program.start] spindle_rpm in the cell"
         yield Issue(
             "error",
             "spindle-off",
             int(toolpath.source_line[row]),
             f"feed move with the spindle off{_why_off(toolpath, row)}",
-            "program S and M3 before it; switched by hand: [program.start] spindle_rpm in the cell",
+            f"program S and M3 before it{by_hand}",
         )
     tapping = {int(event.values["line"]): event.values["cycle"] for event in toolpath.events if _taps(event)}
     yield from _tapping(tapping)

@@ -55,7 +55,7 @@ def _swinging(targets: Targets, toolpath: Toolpath) -> Iterator[Issue]:
             "axis-swings",
             int(targets.source_line[k + 1]),
             f"between two motions the robot would swing the tool {off_deg[k]:.2f} degrees out of its plane",
-            "lower [machine] axis_step_deg, or set [frames] spin to a number",
+            "lower [machine] axis_step_deg",
         )
 
 

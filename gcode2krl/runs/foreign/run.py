@@ -218,15 +218,18 @@ def write_run(guess: Guess, folder: Path, prediction: str = "") -> list[Path]:
     return _written(head, sheets, folder)
 
 
-def write_native(source: Path, folder: Path, prediction: str = "") -> list[Path]:
-    """Write a KRC trace or an RSI log as a run folder; return its files. Errors as for `write_run`."""
+def write_native(source: Path, folder: Path, prediction: str = "") -> tuple[list[Path], tuple[Issue, ...]]:
+    """Write a KRC trace or an RSI log as a run folder; return its files, and what was found in the log.
+
+    Errors as for `write_run`.
+    """
     sheet = _native(source)
     if sheet is None:
         raise input_error("run-layout", "neither a KRC trace nor an RSI log", "", source=str(source))
     _assembled(source.stem, source.parent, RunHead(), {"controller": sheet})
     head: dict[str, Any] = {"prediction": prediction} if prediction else {}
     head["files"] = {"controller": "controller.parquet"}
-    return _written(head, {"controller": sheet}, folder)
+    return _written(head, {"controller": sheet}, folder), sheet.issues
 
 
 def is_native(source: Path) -> bool:
