@@ -67,7 +67,8 @@ class Dexels(NamedTuple):
                 f"a line through the stock meets material more than {MOST} times",
                 "state a coarser [stock] resolution_mm",
             )
-        return self._replace(ends=_widened(self.ends, room), facing=_widened(self.facing, room))
+        more = ((0, 0), (0, self.ends.shape[1]))
+        return self._replace(ends=np.pad(self.ends, more), facing=np.pad(self.facing, more))
 
     def depths(self, places_mm: Floats) -> Floats:
         """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""
@@ -197,10 +198,5 @@ def _firsts(cells: Ints) -> Ints:
 def _packed(normals: Floats) -> Ints32:
     """Return unit vectors (n, 3) as three signed bytes each."""
     parts = np.rint(normals * _SHORTENED).astype(np.int64) & 0xFF
-    return (parts @ np.array([1, 1 << 8, 1 << 16])).astype(np.int32)
-
-
-def _widened(columns: NDArray[np.float32] | Ints32, room: int) -> "NDArray[np.float32] | Ints32":
-    wider = np.zeros((len(columns), room), columns.dtype)
-    wider[:, : columns.shape[1]] = columns
-    return wider
+    packed: Ints32 = (parts @ np.array([1, 1 << 8, 1 << 16])).astype(np.int32)
+    return packed

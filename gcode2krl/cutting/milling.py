@@ -133,8 +133,8 @@ _AXIS_TURNS = Issue(
     "note",
     "axis-turns",
     0,
-    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, peaks are upper bounds, and the finished "
-    "part is not shown",
+    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, peaks are upper bounds, and the "
+    "finished part is not shown",
 )
 _APPROACH_MM = 1e-3
 _ARC_COLUMNS = 6
@@ -466,7 +466,9 @@ class Milling:
             return points
         # the approach, a rapid along the axis, ends at the first sample
         first = taken(points, slice(0, 1))
-        above = first._replace(position_mm=first.position_mm + _APPROACH_MM * first.axis, wanted=np.zeros(1, bool))
+        above = first._replace(
+            position_mm=first.position_mm + _APPROACH_MM * first.axis, wanted=np.zeros(1, bool)
+        )
         return followed(above, points._replace(rapid=np.append(True, points.rapid[1:])))
 
     def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:

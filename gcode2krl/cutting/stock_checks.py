@@ -140,7 +140,12 @@ class TurnedStockChecks:
     """The same of a tool whose axis turns: whether it touches the stock, and how far it goes below it."""
 
     def __init__(
-        self, tools: Sequence[Tool], numbers: Sequence[int], stock: Stock | None, low_mm: Floats, high_mm: Floats
+        self,
+        tools: Sequence[Tool],
+        numbers: Sequence[int],
+        stock: Stock | None,
+        low_mm: Floats,
+        high_mm: Floats,
     ) -> None:
         """Take the tools, what the cell states (None: a guess), and the corners (3,) of the stock."""
         self._shapes, self._numbers = [shape_of(tool) for tool in tools], numbers

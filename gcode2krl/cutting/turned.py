@@ -76,7 +76,8 @@ class Turned(NamedTuple):
     node: Bools
     """(k,) True where the path is read in any case, and cut in between."""
     bodies: Floats
-    """(t, 6) radius of the flat bottom, of the corner arc, sin and cos of the side's edge angle, radius, top."""
+    """(t, 6) radius of the flat bottom, of the corner arc, sin and cos of the side's edge angle, radius,
+    top."""
     longest_mm: Floats
     """(t,) longest step."""
 
@@ -94,10 +95,10 @@ _cut = core_function(
 class _Waiting(NamedTuple):
     points: TurnedPoints
     way_mm: Floats
-    first: Bools
-    node: Bools
     number: Floats
     """(k,) samples before the point."""
+    first: Bools
+    node: Bools
 
 
 class TurnedEngagement:
@@ -126,7 +127,7 @@ class TurnedEngagement:
         self._progress, self._contact = np.array([0, -1], dtype=np.int64), np.zeros(CONTACT_NUMBERS)
         none, empty, vectors = np.zeros(0, dtype=np.bool_), np.zeros(0), np.zeros((0, 3))
         points = TurnedPoints(*(vectors,) * 4, np.zeros(0, dtype=np.int32), none, none)
-        self._waiting = _Waiting(points, empty, none, none, empty)
+        self._waiting = _Waiting(points, empty, empty, none, none)
         self._samples = 0
         self._work = new_work()
 
@@ -152,9 +153,7 @@ class TurnedEngagement:
         rows = before + np.flatnonzero(waiting.points.wanted[before : read + 1])
         met = np.flatnonzero(rapid_mm)
         settled = int(waiting.number[cut]) if count else 0
-        engaged = Engaged(
-            taken(result, rows), waiting.number[met].astype(np.int64), rapid_mm[met], settled
-        )
+        engaged = Engaged(taken(result, rows), waiting.number[met].astype(np.int64), rapid_mm[met], settled)
         self._forget(waiting, min(cut, max(read, 0)))
         return engaged, area_mm2[rows]
 
@@ -164,7 +163,7 @@ class TurnedEngagement:
 
     def _extended(self, points: TurnedPoints, ends: bool) -> _Waiting:
         old = self._waiting
-        joined = followed(old.points, TurnedPoints(*(np.ascontiguousarray(column) for column in points)))
+        joined = followed(old.points, points)
         known = len(old.way_mm)
         tip, axis, tool = joined.position_mm, joined.axis, joined.tool
         step = lengths(np.diff(tip, axis=0, prepend=tip[:1]))
@@ -172,7 +171,8 @@ class TurnedEngagement:
         way = np.cumsum(np.concatenate([old.way_mm[-1:] if known else [0.0], step[max(known, 0) :]]))[1:]
         first = np.concatenate([[True], tool[1:] != tool[:-1]])
         number = self._samples + np.cumsum(joined.wanted) - joined.wanted
-        waiting = _Waiting(joined, np.concatenate([old.way_mm, way]), first, first, number.astype(np.float64))
+        way = np.concatenate([old.way_mm, way])
+        waiting = _Waiting(joined, way, number.astype(np.float64), first, first)
         node = np.zeros(len(tool), dtype=np.bool_)
         if len(tool):
             _mark(self._path(waiting), self._apart_mm, node)
@@ -186,9 +186,10 @@ class TurnedEngagement:
     def _forget(self, waiting: _Waiting, row: int) -> None:
         """Forget the points behind which both cutting and reading are."""
         self._samples += int(np.count_nonzero(waiting.points.wanted[:row]))
-        points = copied(waiting.points, slice(row, None))
-        rest = (column[row:].copy() for column in waiting[1:])
-        self._waiting = _Waiting(points, *rest)
+        rest = slice(row, None)
+        columns = (each[rest].copy() for each in (waiting.way_mm, waiting.number))
+        marks = (each[rest].copy() for each in (waiting.first, waiting.node))
+        self._waiting = _Waiting(copied(waiting.points, rest), *columns, *marks)
         self._progress -= row
 
 

@@ -209,14 +209,32 @@ static Hit hold(const Cut *cut, const double *place, double share) {
     return hit;
 }
 
+/* Write the normal of the surface that a step leaves between two poses: that of the two normals there which is across the
+   way. A sharp edge leaves a surface that is neither of its own sides. */
+static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double *normal) {
+    const int axis = cut->field.axis;
+    const double *a = from->normal[end], *b = to->normal[end];
+    const double of_b = fabs(from->slope[end] * a[axis]), of_a = fabs(to->slope[end] * b[axis]);
+    if (!(of_a + of_b > 0.0) || (from->slope[end] > 0.0) == (to->slope[end] > 0.0))
+        return;
+    double square = 0.0;
+    for (int k = 0; k < 3; k++) {
+        normal[k] = of_a * a[k] + of_b * b[k];
+        square += squared(normal[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] /= sqrt(square);
+}
+
 /* Widen `best` to the end of what the step covers on a ray, entry (0) or exit (1): between two poses whose slopes say that
    it lies between them. A pose that misses has none. */
 static void widen(const Cut *cut, const double *place, int end, Hit from, Hit to, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
     double a = 0.0, b = 1.0;
+    bool is_between = false;
     for (int round = 0; round < HALVINGS; round++) {
         if ((from.hits && from.slope[end] * sense >= 0.0) || (to.hits && to.slope[end] * sense <= 0.0))
-            return;
+            break;
         double share = 0.5 * (a + b);
         if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola */
             const double meet = to.at[end] - from.at[end] - to.slope[end] * (b - a);
@@ -226,6 +244,7 @@ static void widen(const Cut *cut, const double *place, int end, Hit from, Hit to
         const Hit here = hold(cut, place, share);
         if (!here.hits && !from.hits && !to.hits)
             return;
+        is_between = is_between || here.hits;
         if (here.hits && (!best->hits || (here.at[end] - best->at[end]) * sense < 0.0)) {
             best->at[end] = here.at[end];
             copy3(here.normal[end], best->normal[end]);
@@ -239,6 +258,8 @@ static void widen(const Cut *cut, const double *place, int end, Hit from, Hit to
             to = here;
         }
     }
+    if (is_between && from.hits && to.hits)
+        face(cut, end, &from, &to, best->normal[end]);
 }
 
 /* Return what the whole step covers on a ray. */

@@ -1,4 +1,6 @@
-"""Dexels: against the height field where the axis is constant, against itself turned, against exact solids."""
+"""Dexels: against the height field where the axis is constant, against themselves turned, against solids."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -94,7 +96,7 @@ def test_how_many_points_come_at_a_time_changes_nothing():
     borders = [0, 1, 40, 47, 120, len(one.tip)]
     parts = [
         engagement.take(taken(points, slice(a, b)), b == len(one.tip)).result.force_N
-        for a, b in zip(borders, borders[1:], strict=False)
+        for a, b in pairwise(borders)
     ]
     np.testing.assert_array_equal(np.concatenate(parts), whole.force_N)
     for name in ("ends", "filled"):
@@ -139,7 +141,9 @@ def test_a_mesh_becomes_dexels():
     dexels = dexel_mesh(ball, 0.5)
     assert dexels.volume_mm3 == pytest.approx(ball.volume, rel=0.003)
     places = np.random.default_rng(1).normal(size=(200, 3))
-    places *= np.random.default_rng(2).uniform(9.3, 10.7, 200)[:, None] / np.linalg.norm(places, axis=1)[:, None]
+    places *= (
+        np.random.default_rng(2).uniform(9.3, 10.7, 200)[:, None] / np.linalg.norm(places, axis=1)[:, None]
+    )
     depth = dexels.depths(places)
     np.testing.assert_allclose(depth, 10.0 - np.linalg.norm(places, axis=1), atol=0.12)
 
