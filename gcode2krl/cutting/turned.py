@@ -186,10 +186,10 @@ class TurnedEngagement:
     def _forget(self, waiting: _Waiting, row: int) -> None:
         """Forget the points behind which both cutting and reading are."""
         self._samples += int(np.count_nonzero(waiting.points.wanted[:row]))
-        rest = slice(row, None)
-        columns = (each[rest].copy() for each in (waiting.way_mm, waiting.number))
-        marks = (each[rest].copy() for each in (waiting.first, waiting.node))
-        self._waiting = _Waiting(copied(waiting.points, rest), *columns, *marks)
+        way_mm, number = waiting.way_mm[row:].copy(), waiting.number[row:].copy()
+        first, node = waiting.first[row:].copy(), waiting.node[row:].copy()
+        points = copied(waiting.points, slice(row, None))
+        self._waiting = _Waiting(points, way_mm, number, first, node)
         self._progress -= row
 
 
