@@ -234,7 +234,8 @@ def print_cases(count, most):
         each = 1e6 * seconds / len(case.tip)
         print(
             f"| {case.name} | {case.tool.kind} {case.tool.diameter_mm:g} | {exact:.0f} "
-            f"| {100 * error:+.2f} % | {100 * contact:+.1f} % | {missed} of {int(sizes.sum())} | {each:.0f} |",
+            f"| {100 * error:+.2f} % | {100 * contact:+.1f} % "
+            f"| {missed} of {int(sizes.sum())} | {each:.0f} |",
             flush=True,
         )
     volume, contact, missed = (100 * np.array(column) for column in zip(*worst, strict=True))
