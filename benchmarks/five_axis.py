@@ -135,10 +135,13 @@ def exact_volume(case):
     cutter = manifold3d.Manifold.revolve(manifold3d.CrossSection([np.stack([r, z], axis=1)]), 96)
     part = manifold3d.Manifold.cube(list(STOCK[1] - STOCK[0])).translate(list(STOCK[0]))
     whole = part.volume()
-    bodies = [
-        cutter.transform(np.column_stack([frame(axis), tip]))
-        for tip, axis in zip(case.tip, case.axis, strict=True)
-    ]
+    way = np.diff(np.hstack([case.tip, case.axis]), axis=0)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    # one hull covers a straight way of a constant axis
+    bends = np.abs(np.diff(way, axis=0)).max(axis=1) > 1e-9
+    bends |= np.abs(way[1:, 3:]).max(axis=1) > 0.0
+    rows = [0, *(np.flatnonzero(bends) + 1), len(case.tip) - 1]
+    bodies = [cutter.transform(np.column_stack([frame(case.axis[row]), case.tip[row]])) for row in rows]
     sweeps = [manifold3d.Manifold.batch_hull([a, b]) for a, b in itertools.pairwise(bodies)]
     for first in range(0, len(sweeps), 16):
         part -= manifold3d.Manifold.batch_boolean(sweeps[first : first + 16], manifold3d.OpType.Add)

@@ -21,7 +21,7 @@ SIDE = 4
 """Rays along one side of a block with a common bound of its ends."""
 MOST = 32
 """Stretches of material that a ray may have."""
-CELLS_PER_DIAMETER = 40.0
+CELLS_PER_DIAMETER = 32.0
 """Default resolution: 0.4 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
 MAX_RAYS = 8_000_000
 _FEW = 2

@@ -31,9 +31,8 @@ CONTACT_NUMBERS = 18 + 2 * ARCS
 PROGRESS = 2
 """Numbers that say how far a motion has come: the last point that is cut, the last that is read."""
 NODES_PER_DIAMETER = 10.0
-_STEP_ERROR_OF_CELL = 0.1
-"""By how much a step may leave a surface too high where no ray sees its middle, in cells: what two circles
-of the cutter's radius leave between them."""
+_STEP_OF_DIAMETER = 0.3
+"""Longest step of the removal."""
 _BINS_PER_TURN = 96, 192
 _BAND_OF_DIAMETER, _BAND_CELLS = 1.0 / 16.0, 4.0
 _ABOVE_MM = 60.0
@@ -122,7 +121,7 @@ class TurnedEngagement:
         self._bodies = np.array([_body(tool) for tool in tools])
         radius = self._bodies[:, 4]
         self._apart_mm = 2.0 * radius / nodes_per_diameter
-        self._longest_mm = np.sqrt(8.0 * _STEP_ERROR_OF_CELL * cell_mm * radius)
+        self._longest_mm = _STEP_OF_DIAMETER * 2.0 * radius
         self._cutters = _cutters(tools, cell_mm, self._apart_mm)
         self._progress, self._contact = np.array([0, -1], dtype=np.int64), np.zeros(CONTACT_NUMBERS)
         none, empty, vectors = np.zeros(0, dtype=np.bool_), np.zeros(0), np.zeros((0, 3))
@@ -223,7 +222,7 @@ def _short_bands(tool: Tool, cell_mm: float) -> Floats:
     """Return the edge in bands (s, 7) as for a height field, the tall ones in pieces."""
     tall_mm = max(_BAND_OF_DIAMETER * tool.diameter_mm, _BAND_CELLS * cell_mm)
     pieces = []
-    for band in bands_of(tool, cell_mm):
+    for band in bands_of(tool, 0.5 * cell_mm):
         count = max(1, math.ceil((band[1] - band[0]) / tall_mm - 1e-9))
         share = np.linspace(0.0, 1.0, count + 1)
         z, r = (band[k] + share * (band[k + 1] - band[k]) for k in (0, 2))

@@ -10,11 +10,14 @@ a plane parts them from the body at both poses. */
 #include "collision/shapes.h"
 
 #define NEAR_MM 2e-6       /* a place is on a body */
+#define CLOSE_MM 1e-3      /* a last step of Newton from there ends on it, where the ray is so steep */
+#define STEEP 0.3
 #define THIN_MM 1e-4       /* a stretch that is shorter is none; an end that moves by less stays */
 #define PARTED_MM 1e-5     /* a plane parts where it does so by no less than minus this */
+#define FINE 0.02          /* of a cell: where a swept surface may be beside the true one */
 #define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
 
-enum { SIDE = TD_SIDE, MOST_NEWTON = 40, HALVINGS = 5, SHORTENED = 127 };
+enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10, SHORTENED = 127 };
 
 typedef struct {
     const Dexels *stock;
@@ -23,6 +26,7 @@ typedef struct {
     Field field;
     Pose first, last;
     double low[3], high[3]; /* how far it reaches */
+    double fine_mm;         /* where a surface may be beside the swept one */
 } Cut;
 
 /* Where a ray enters and leaves a body: the place on it, and how that moves with the step. */
@@ -124,24 +128,52 @@ static bool approach(const Body *body, const Seen *seen, double sense, double li
         *at = s - outside / slope;
         if ((*at - limit) * sense > 0.0)
             return false;
+        if (outside < CLOSE_MM && fabs(slope) > STEEP)
+            return true;
     }
     return true;
 }
 
-/* Move the ends of a ray that lie below the middle of a ball onto it; returns false where it is passed by. */
+/* Move the ends of a ray that lie below the rim of a ball onto it; returns false where it is passed by. */
 static bool begin_on_ball(const Body *body, const Seen *seen, double *ends) {
     const double up = body->corner - seen->height; /* the middle, from the place at s = 0 */
+    const double rim = body->corner * (1.0 - body->cos_kappa);
     const double along = body->corner * seen->climb;
     const double root = along * along - seen->c - up * up + squared(body->corner);
     for (int end = 0; end < 2; end++) {
-        if (seen->height + ends[end] * seen->climb >= body->corner)
+        if (seen->height + ends[end] * seen->climb >= rim)
             continue;
         if (root <= 0.0)
             return false;
         const double at = along + (end == 0 ? -sqrt(root) : sqrt(root));
-        if (seen->height + at * seen->climb < body->corner)
+        if (seen->height + at * seen->climb < rim)
             ends[end] = at;
     }
+    return ends[0] < ends[1];
+}
+
+/* Move the ends of a ray to the cone that the side of a body lies on; returns false where it is passed by. */
+static bool begin_on_cone(const Body *body, const Seen *seen, double *ends) {
+    const double widens = body->cos_kappa / body->sin_kappa;
+    const double at_tip = body->bottom + body->corner * (1.0 / body->sin_kappa - widens);
+    const double first = at_tip + widens * seen->height, change = widens * seen->climb;
+    const double a = seen->a - change * change, b = seen->b - first * change, c = seen->c - first * first;
+    const double root = b * b - a * c;
+    if (fabs(a) < 1e-9)
+        return true; /* along the side */
+    if (root <= 0.0)
+        return a < 0.0;
+    const double low = (-b - sqrt(root)) / a, high = (-b + sqrt(root)) / a;
+    if (a > 0.0) {
+        ends[0] = greater(ends[0], low);
+        ends[1] = lesser(ends[1], high);
+        return ends[0] < ends[1] && first + low * change > 0.0;
+    }
+    /* steeper than the side: it is passed once on each half of the cone */
+    if (change > 0.0)
+        ends[0] = greater(ends[0], greater(low, high));
+    else
+        ends[1] = lesser(ends[1], lesser(low, high));
     return ends[0] < ends[1];
 }
 
@@ -187,6 +219,8 @@ static Hit hold(const Cut *cut, const double *place, double share) {
     if (!(ends[0] < ends[1]))
         return hit;
     double away[2][2];
+    if (body->cos_kappa > 0.0 && !begin_on_cone(body, &seen, ends))
+        return hit;
     if (body->bottom == 0.0 && body->corner > 0.0 && !begin_on_ball(body, &seen, ends))
         return hit;
     if (!approach(body, &seen, 1.0, ends[1], &ends[0], away[0]) ||
@@ -226,20 +260,21 @@ static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double
         normal[k] /= sqrt(square);
 }
 
-/* Widen `best` to the end of what the step covers on a ray, entry (0) or exit (1): between two poses whose slopes say that
-   it lies between them. A pose that misses has none. */
-static void widen(const Cut *cut, const double *place, int end, Hit from, Hit to, Hit *best) {
+/* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
+   whose slopes say that it lies between them. A pose that misses has none. */
+static void widen(const Cut *cut, const double *place, int end, double a, Hit from, double b, Hit to, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
-    double a = 0.0, b = 1.0;
     bool is_between = false;
-    for (int round = 0; round < HALVINGS; round++) {
+    for (int round = 0; round < MOST_HALVINGS; round++) {
         if ((from.hits && from.slope[end] * sense >= 0.0) || (to.hits && to.slope[end] * sense <= 0.0))
             break;
         double share = 0.5 * (a + b);
-        if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola */
+        if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola; none is beyond */
             const double meet = to.at[end] - from.at[end] - to.slope[end] * (b - a);
-            share = a + clamped(meet / (from.slope[end] - to.slope[end]), 0.02 * (b - a), 0.98 * (b - a));
-            round += 2;
+            const double after = clamped(meet / (from.slope[end] - to.slope[end]), 0.02 * (b - a), 0.98 * (b - a));
+            if ((best->at[end] - from.at[end] - from.slope[end] * after) * sense < cut->fine_mm)
+                break;
+            share = a + after;
         }
         const Hit here = hold(cut, place, share);
         if (!here.hits && !from.hits && !to.hits)
@@ -262,6 +297,22 @@ static void widen(const Cut *cut, const double *place, int end, Hit from, Hit to
         face(cut, end, &from, &to, best->normal[end]);
 }
 
+/* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray. */
+static double nearest_share(const Cut *cut, const double *place) {
+    const int u = cut->field.u, v = cut->field.v;
+    const Pose middle = pose_at(cut->step, 0.5);
+    const double low = cut->body->corner, high = cut->body->top;
+    const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
+    const double off_u = place[u] - middle.tip[u], off_v = place[v] - middle.tip[v];
+    const double across = way_u * middle.axis[v] - way_v * middle.axis[u];
+    double share = 0.0, up = low, square = way_u * way_u + way_v * way_v;
+    if (fabs(across) > 1e-6)
+        up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
+    if (square > 1e-12)
+        share = ((off_u - up * middle.axis[u]) * way_u + (off_v - up * middle.axis[v]) * way_v) / square;
+    return clamped(0.5 + share, 0.0, 1.0);
+}
+
 /* Return what the whole step covers on a ray. */
 static Hit swept(const Cut *cut, const double *place) {
     const Hit from = hold(cut, place, 0.0);
@@ -270,9 +321,13 @@ static Hit swept(const Cut *cut, const double *place) {
     const Hit to = hold(cut, place, 1.0);
     Hit best = from.hits ? from : to;
     if (!best.hits) {
-        best = hold(cut, place, 0.5);
-        if (!best.hits)
-            return best;
+        const double share = nearest_share(cut, place);
+        const Hit here = best = hold(cut, place, share);
+        for (int end = 0; end < 2 && here.hits; end++) {
+            widen(cut, place, end, 0.0, from, share, here, &best);
+            widen(cut, place, end, share, here, 1.0, to, &best);
+        }
+        return best;
     }
     for (int end = 0; end < 2; end++) {
         const double sense = end == 0 ? 1.0 : -1.0;
@@ -280,7 +335,7 @@ static Hit swept(const Cut *cut, const double *place) {
             best.at[end] = to.at[end];
             copy3(to.normal[end], best.normal[end]);
         }
-        widen(cut, place, end, from, to, &best);
+        widen(cut, place, end, 0.0, from, 1.0, to, &best);
     }
     return best;
 }
@@ -446,7 +501,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
 
 /* Take a step out of the stock: see dexels.h. */
 bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm) {
-    Cut cut = {.stock = stock, .body = body, .step = step, .first = pose_at(step, 0.0), .last = pose_at(step, 1.0)};
+    Cut cut = {.stock = stock, .body = body, .step = step, .first = pose_at(step, 0.0), .last = pose_at(step, 1.0), .fine_mm = FINE * AT(stock->cell_mm, 0)};
     int64_t cells[3][2];
     for (int axis = 0; axis < 3; axis++) {
         double along[3] = {0.0, 0.0, 0.0};
@@ -476,12 +531,13 @@ static int64_t cell_of(const Dexels *stock, int axis, double at) {
 }
 
 double depth_at(const Dexels *stock, const double *place, double near_mm) {
-    double best = 0.0, steepest = 0.0;
+    double best = 0.0, steepest = 0.0, beyond = -INFINITY; /* of the box */
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
         const double low = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis) * (double)AT(stock->cells, axis);
-        if (place[axis] < low - near_mm || place[axis] > low + size + near_mm)
+        beyond = greater(beyond, greater(low - place[axis], place[axis] - low - size));
+        if (beyond > near_mm)
             return -near_mm;
         cell[axis] = cell_of(stock, axis, place[axis]);
     }
@@ -517,9 +573,9 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
             best = own;
         }
     }
-    if (steepest > 0.0)
-        return best;
-    return inside >= 2 ? near_mm : -near_mm;
+    if (!(steepest > 0.0))
+        best = inside >= 2 ? near_mm : -near_mm;
+    return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
 
 double highest_near(const Dexels *stock, double x, double y, double radius) {

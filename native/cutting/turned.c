@@ -12,7 +12,9 @@ in its own plane of feed and axis. Between two nodes that agree lies what is bet
 #define FEEL_OF_NEAR 0.01   /* material that is thinner, as a share of what is near, is rounding */
 #define SAME_COSINE 0.9986  /* of 3 degrees: a way that has turned by less is straight */
 #define LONG_TURN 0.05      /* rad by which the axis turns at most within a step */
-#define SHARE_NEAR 0.1      /* of the force: what may lie beside the line between two nodes */
+#define EVEN_OF_NEAR 0.015  /* by which a step may pass beside the way, as a share of what is near */
+#define SHORT 0.3            /* length of a stretch, in radii, whose middle need not be read where both ends are alike */
+#define SHARE_NEAR 0.05     /* of the force: what may lie beside the line between two nodes */
 
 enum { MOST_MET = 12, HALVINGS = 3, COLLISION_BINS = 32, NUMBERS = 6 };
 
@@ -126,19 +128,61 @@ static bool cut_way(const Turning *turning, int64_t from, int64_t to, double *ra
     return true;
 }
 
-/* Cut up to the last node that is not after a place on the way; return false where a ray has no room. */
-static bool follow(const Turning *turning, double way_mm, int64_t last, Progress *progress, Floats rapid_mm) {
+static double turned_between(const Turned *points, int64_t from, int64_t to) {
+    return distance3(row3(points->axis, from), row3(points->axis, to));
+}
+
+/* Tell whether the nodes between two are so near a single step from one to the other that it may cut all the way. */
+static bool is_one_step(const Turning *turning, int64_t from, int64_t to) {
     const Turned *points = turning->points;
-    for (int64_t next = progress->cut + 1; next <= last; next++) {
-        if (!AT(points->node, next))
+    const int64_t tool = AT(points->tool, to);
+    const double top = body_of(points, tool)->top, turn = turned_between(points, from, to);
+    const double way = distance3(row3(points->position_mm, from), row3(points->position_mm, to)), whole = way + top * turn;
+    if (AT(points->rapid, to) || whole > AT(points->longest_mm, tool) || turn > LONG_TURN)
+        return false;
+    for (int64_t k = from + 1; k < to; k++) {
+        if (!AT(points->node, k))
             continue;
-        if (AT(points->way_mm, next) > way_mm)
-            break;
-        if (!AT(points->first, next) && !cut_way(turning, progress->cut, next, &AT(rapid_mm, next)))
+        const double passed = distance3(row3(points->position_mm, from), row3(points->position_mm, k)) +
+                              top * turned_between(points, from, k);
+        if (!(passed < whole))
             return false;
-        progress->cut = next;
+        double tip[3], axis[3];
+        between3(row3(points->position_mm, from), row3(points->position_mm, to), passed / whole, tip);
+        between3(row3(points->axis, from), row3(points->axis, to), passed / whole, axis);
+        if (distance3(tip, row3(points->position_mm, k)) + top * distance3(axis, row3(points->axis, k)) >
+            EVEN_OF_NEAR * turning->near_mm)
+            return false;
     }
     return true;
+}
+
+/* Cut up to the last node that is not after a place on the way, in steps as long as may be: what might become longer waits,
+   unless all is to be cut. Returns false where a ray has no room. */
+static bool follow(const Turning *turning, double way_mm, int64_t last, Progress *progress, Floats rapid_mm) {
+    const Turned *points = turning->points;
+    for (;;) {
+        int64_t to = -1;
+        bool may_grow = way_mm < INFINITY;
+        for (int64_t next = progress->cut + 1; next <= last; next++) {
+            if (!AT(points->node, next))
+                continue;
+            if (AT(points->way_mm, next) > way_mm)
+                break;
+            const bool extends = !AT(points->first, next) && is_one_step(turning, progress->cut, next);
+            if (to < 0 || extends)
+                to = next;
+            if (!extends) {
+                may_grow = false;
+                break;
+            }
+        }
+        if (to < 0 || may_grow)
+            return true;
+        if (!AT(points->first, to) && !cut_way(turning, progress->cut, to, &AT(rapid_mm, to)))
+            return false;
+        progress->cut = to;
+    }
 }
 
 /* Note the poses since the last cut from which the way has turned. */
@@ -506,11 +550,23 @@ static bool lies_between(const Turning *turning, int64_t i, const Contact *here,
     return off <= squared(SHARE_NEAR) * whole;
 }
 
+/* Tell whether both ends of a short stretch are alike. */
+static bool is_level(const Turning *turning, int64_t i, const Contact *a, int64_t j, const Contact *b) {
+    const Turned *points = turning->points;
+    return AT(points->way_mm, j) - AT(points->way_mm, i) <= SHORT * body_of(points, AT(points->tool, j))->radius &&
+           lies_between(turning, j, b, a, a, 0.0);
+}
+
 /* Write the rows after one reading up to another: the middle one is read, and so on by halves until it lies between. */
 static void read_between(const Turning *turning, int64_t cut, int64_t i, const Contact *a, int64_t j, const Contact *b,
                          const Result *result, Floats area_mm2) {
     if (j - i < 2)
         return;
+    if (is_level(turning, i, a, j, b)) {
+        for (int64_t k = i + 1; k < j; k++)
+            write_contact(turning, k, a, b, (double)(k - i) / (double)(j - i), result, area_mm2);
+        return;
+    }
     const int64_t middle = (i + j) / 2;
     const double share = (double)(middle - i) / (double)(j - i);
     const Contact here = read_contact(turning, middle, cut);
