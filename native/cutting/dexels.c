@@ -531,7 +531,7 @@ static int64_t cell_of(const Dexels *stock, int axis, double at) {
 }
 
 double depth_at(const Dexels *stock, const double *place, double near_mm) {
-    double best = 0.0, steepest = 0.0, beyond = -INFINITY; /* of the box */
+    double best = 0.0, nearest = INFINITY, beyond = -INFINITY; /* of the box */
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -568,12 +568,13 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
             own = own_steep == 0.0 ? depth : after % 2 ? lesser(own, depth) : greater(own, depth);
             own_steep = greater(own_steep, steep);
         }
-        if (own_steep > steepest) {
-            steepest = own_steep;
+        /* beside an edge the plane of the farther side goes on where there is no surface of it */
+        if (own_steep > 0.0 && fabs(own) < nearest * own_steep) {
+            nearest = fabs(own) / own_steep;
             best = own;
         }
     }
-    if (!(steepest > 0.0))
+    if (nearest == INFINITY)
         best = inside >= 2 ? near_mm : -near_mm;
     return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
