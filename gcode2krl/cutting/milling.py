@@ -389,7 +389,7 @@ class Milling:
     def part(self) -> HeightField | Dexels:
         """Return the material that is left."""
         if isinstance(self._engagement, TurnedEngagement):
-            return self._engagement.dexels.copy()
+            return self._engagement.dexels
         field = self._before.copy()
         self._engagement.write_back(field)
         return field

@@ -31,7 +31,7 @@ CONTACT_NUMBERS = 18 + 2 * ARCS
 PROGRESS = 2
 """Numbers that say how far a motion has come: the last point that is cut, the last that is read."""
 NODES_PER_DIAMETER = 10.0
-_STEP_OF_DIAMETER = 0.3
+_STEP_OF_DIAMETER = 0.4
 """Longest step of the removal."""
 _BINS_PER_TURN = 96, 192
 _BAND_OF_DIAMETER, _BAND_CELLS = 1.0 / 16.0, 4.0

@@ -15,6 +15,7 @@ a plane parts them from the body at both poses. */
 #define THIN_MM 1e-4       /* a stretch that is shorter is none; an end that moves by less stays */
 #define PARTED_MM 1e-5     /* a plane parts where it does so by no less than minus this */
 #define FINE 0.02          /* of a cell: where a swept surface may be beside the true one */
+#define PARALLEL 1e-6      /* cosine between ray and surface below which its slope says nothing of the step */
 #define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
 
 enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10, SHORTENED = 127 };
@@ -24,7 +25,7 @@ typedef struct {
     const Body *body;
     const Step *step;
     Field field;
-    Pose first, last;
+    Pose first, middle, last;
     double low[3], high[3]; /* how far it reaches */
     double fine_mm;         /* where a surface may be beside the swept one */
 } Cut;
@@ -260,9 +261,28 @@ static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double
         normal[k] /= sqrt(square);
 }
 
+/* Tell whether a ray has material between two places on it, in either order. */
+static bool has_between(const Cut *cut, int64_t ray, double a, double b) {
+    const double low = lesser(a, b) - cut->fine_mm, high = greater(a, b) + cut->fine_mm;
+    for (int64_t k = 0; k < AT(cut->stock->filled, ray); k++)
+        if (CELL(cut->stock->ends, ray, 2 * k) < high && CELL(cut->stock->ends, ray, 2 * k + 1) > low)
+            return true;
+    return false;
+}
+
+/* Tell whether a ray has material as far as the step may reach on it, by the tangents at one pose, `ahead` of which (1, -1)
+   the step lies: what is covered begins no earlier and ends no later than they say. */
+static bool is_in_reach(const Cut *cut, int64_t ray, const Hit *hit, double ahead) {
+    const int axis = cut->field.axis;
+    if (fabs(hit->normal[0][axis]) < PARALLEL || fabs(hit->normal[1][axis]) < PARALLEL)
+        return true;
+    return has_between(cut, ray, hit->at[0] + lesser(ahead * hit->slope[0], 0.0),
+                       hit->at[1] + greater(ahead * hit->slope[1], 0.0));
+}
+
 /* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
    whose slopes say that it lies between them. A pose that misses has none. */
-static void widen(const Cut *cut, const double *place, int end, double a, Hit from, double b, Hit to, Hit *best) {
+static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, Hit from, double b, Hit to, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
     bool is_between = false;
     for (int round = 0; round < MOST_HALVINGS; round++) {
@@ -272,7 +292,8 @@ static void widen(const Cut *cut, const double *place, int end, double a, Hit fr
         if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola; none is beyond */
             const double meet = to.at[end] - from.at[end] - to.slope[end] * (b - a);
             const double after = clamped(meet / (from.slope[end] - to.slope[end]), 0.02 * (b - a), 0.98 * (b - a));
-            if ((best->at[end] - from.at[end] - from.slope[end] * after) * sense < cut->fine_mm)
+            const double bound = from.at[end] + from.slope[end] * after;
+            if ((best->at[end] - bound) * sense < cut->fine_mm || !has_between(cut, ray, bound, best->at[end]))
                 break;
             share = a + after;
         }
@@ -300,32 +321,36 @@ static void widen(const Cut *cut, const double *place, int end, double a, Hit fr
 /* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray. */
 static double nearest_share(const Cut *cut, const double *place) {
     const int u = cut->field.u, v = cut->field.v;
-    const Pose middle = pose_at(cut->step, 0.5);
+    const Pose *middle = &cut->middle;
     const double low = cut->body->corner, high = cut->body->top;
     const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
-    const double off_u = place[u] - middle.tip[u], off_v = place[v] - middle.tip[v];
-    const double across = way_u * middle.axis[v] - way_v * middle.axis[u];
+    const double off_u = place[u] - middle->tip[u], off_v = place[v] - middle->tip[v];
+    const double across = way_u * middle->axis[v] - way_v * middle->axis[u];
     double share = 0.0, up = low, square = way_u * way_u + way_v * way_v;
     if (fabs(across) > 1e-6)
         up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
     if (square > 1e-12)
-        share = ((off_u - up * middle.axis[u]) * way_u + (off_v - up * middle.axis[v]) * way_v) / square;
+        share = ((off_u - up * middle->axis[u]) * way_u + (off_v - up * middle->axis[v]) * way_v) / square;
     return clamped(0.5 + share, 0.0, 1.0);
 }
 
 /* Return what the whole step covers on a ray. */
-static Hit swept(const Cut *cut, const double *place) {
+static Hit swept(const Cut *cut, int64_t ray, const double *place) {
     const Hit from = hold(cut, place, 0.0);
     if (cut->step->follows && from.hits && from.slope[0] >= 0.0 && from.slope[1] <= 0.0)
         return (Hit){.hits = false}; /* it only leaves the ray: what it covers is cut */
+    if (from.hits && !is_in_reach(cut, ray, &from, 1.0))
+        return (Hit){.hits = false};
     const Hit to = hold(cut, place, 1.0);
+    if (to.hits && !is_in_reach(cut, ray, &to, -1.0))
+        return (Hit){.hits = false};
     Hit best = from.hits ? from : to;
     if (!best.hits) {
         const double share = nearest_share(cut, place);
         const Hit here = best = hold(cut, place, share);
         for (int end = 0; end < 2 && here.hits; end++) {
-            widen(cut, place, end, 0.0, from, share, here, &best);
-            widen(cut, place, end, share, here, 1.0, to, &best);
+            widen(cut, ray, place, end, 0.0, from, share, here, &best);
+            widen(cut, ray, place, end, share, here, 1.0, to, &best);
         }
         return best;
     }
@@ -335,7 +360,7 @@ static Hit swept(const Cut *cut, const double *place) {
             best.at[end] = to.at[end];
             copy3(to.normal[end], best.normal[end]);
         }
-        widen(cut, place, end, 0.0, from, 1.0, to, &best);
+        widen(cut, ray, place, end, 0.0, from, 1.0, to, &best);
     }
     return best;
 }
@@ -396,24 +421,24 @@ static bool take(const Dexels *stock, int64_t ray, const Hit *hit, double *longe
 /* Tell whether a plane parts a box from the body at both poses: across the way from its axis to the box. */
 static bool is_parted(const Cut *cut, const double *low, const double *high) {
     const Body *body = cut->body;
-    const Pose middle = pose_at(cut->step, 0.5);
+    const Pose *middle = &cut->middle;
     double on_axis[3], near[3], off[3], away[2];
     for (int k = 0; k < 3; k++)
         near[k] = 0.5 * (low[k] + high[k]);
     for (int round = 0; round < 3; round++) {
-        minus3(near, middle.tip, off);
-        const double up = clamped(dot3(off, middle.axis), lesser(body->corner + body->radius, 0.5 * body->top), body->top);
+        minus3(near, middle->tip, off);
+        const double up = clamped(dot3(off, middle->axis), lesser(body->corner + body->radius, 0.5 * body->top), body->top);
         for (int k = 0; k < 3; k++) {
-            on_axis[k] = middle.tip[k] + up * middle.axis[k];
+            on_axis[k] = middle->tip[k] + up * middle->axis[k];
             near[k] = clamped(on_axis[k], low[k], high[k]);
         }
     }
-    minus3(near, middle.tip, off);
-    const double height = dot3(off, middle.axis), radius = sqrt(greater(dot3(off, off) - height * height, 1e-18));
+    minus3(near, middle->tip, off);
+    const double height = dot3(off, middle->axis), radius = sqrt(greater(dot3(off, off) - height * height, 1e-18));
     outside_of(body, radius, height, away);
     double normal[3], nearest = 0.0;
     for (int k = 0; k < 3; k++) {
-        normal[k] = away[0] * (off[k] - height * middle.axis[k]) / radius + away[1] * middle.axis[k];
+        normal[k] = away[0] * (off[k] - height * middle->axis[k]) / radius + away[1] * middle->axis[k];
         nearest += normal[k] * (normal[k] > 0.0 ? low[k] : high[k]);
     }
     return nearest >= greater(reach_of(body, &cut->first, normal), reach_of(body, &cut->last, normal)) - PARTED_MM;
@@ -491,9 +516,10 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
                 continue;
             place[field->u] = middle_of(stock, field->u, j);
             place[field->v] = middle_of(stock, field->v, i);
-            const Hit hit = swept(cut, place);
+            const int64_t ray = field->first + i * field->columns + j;
+            const Hit hit = swept(cut, ray, place);
             if (hit.hits)
-                has_room = take(stock, field->first + i * field->columns + j, &hit, longest);
+                has_room = take(stock, ray, &hit, longest);
         }
     bound_block(stock, field, row, column);
     return has_room;
@@ -501,7 +527,10 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
 
 /* Take a step out of the stock: see dexels.h. */
 bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm) {
-    Cut cut = {.stock = stock, .body = body, .step = step, .first = pose_at(step, 0.0), .last = pose_at(step, 1.0), .fine_mm = FINE * AT(stock->cell_mm, 0)};
+    Cut cut = {.stock = stock, .body = body, .step = step, .fine_mm = FINE * AT(stock->cell_mm, 0)};
+    cut.first = pose_at(step, 0.0);
+    cut.middle = pose_at(step, 0.5);
+    cut.last = pose_at(step, 1.0);
     int64_t cells[3][2];
     for (int axis = 0; axis < 3; axis++) {
         double along[3] = {0.0, 0.0, 0.0};
