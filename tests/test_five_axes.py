@@ -85,8 +85,19 @@ def test_the_example_is_translated_with_forces(run, tmp_path):
     assert "not predicted" not in done.err
     head = (tmp_path / "part.src").read_text().split(";ENDFOLD")[0]
     assert "material removal (rapids through stock" not in head
-    assert (tmp_path / "part.pilot.csv").exists()
     assert run("verify", "part.src", PART, "--cell", CELL).code == 0
+
+
+def test_no_robot_is_moved_by_forces_of_a_turning_axis(run, tmp_path):
+    done = run(PART, "--cell", CELL, "-o", "part.src")
+    assert "carries no pilot force: the tool axis turns" in done.err
+    assert not (tmp_path / "part.pilot.csv").exists()
+    assert "$SEN_PINT" not in (tmp_path / "part.src").read_text()
+    for asked in (["--pilot", "index"], ["--pilot", "values"], ["--compensate", "offline"]):
+        done = run(PART, "--cell", CELL, "-o", "other.src", *asked)
+        assert done.code == 1
+        assert "[axis-turns]" in done.err
+        assert not (tmp_path / "other.src").exists()
 
 
 def test_predict_has_forces_and_says_what_is_less_sure():

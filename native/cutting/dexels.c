@@ -560,7 +560,7 @@ static int64_t cell_of(const Dexels *stock, int axis, double at) {
 }
 
 double depth_at(const Dexels *stock, const double *place, double near_mm) {
-    double best = 0.0, nearest = INFINITY, beyond = -INFINITY; /* of the box */
+    double best = 0.0, nearest_square = INFINITY, beyond = -INFINITY; /* of the box */
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -577,7 +577,7 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
         while (after < 2 * count && CELL(stock->ends, ray, after) <= (float)place[axis])
             after++;
         inside += after % 2;
-        double own = 0.0, own_steep = 0.0;
+        double own = 0.0, own_square = INFINITY;
         for (int64_t end = after - 1; end <= after; end++) {
             if (end < 0 || end >= 2 * count)
                 continue;
@@ -594,16 +594,16 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
             if (fabs(depth) > near_mm)
                 continue;
             /* of a thin layer both sides count, of a thin gap either */
-            own = own_steep == 0.0 ? depth : after % 2 ? lesser(own, depth) : greater(own, depth);
-            own_steep = greater(own_steep, steep);
+            own = own_square == INFINITY ? depth : after % 2 ? lesser(own, depth) : greater(own, depth);
+            own_square = lesser(own_square, dot3(off, off));
         }
         /* beside an edge the plane of the farther side goes on where there is no surface of it */
-        if (own_steep > 0.0 && fabs(own) < nearest * own_steep) {
-            nearest = fabs(own) / own_steep;
+        if (own_square < nearest_square) {
+            nearest_square = own_square;
             best = own;
         }
     }
-    if (nearest == INFINITY)
+    if (nearest_square == INFINITY)
         best = inside >= 2 ? near_mm : -near_mm;
     return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
