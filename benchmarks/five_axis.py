@@ -5,7 +5,7 @@ plunges along a tilted axis. The volume that a case removes is compared with boo
 the cutter at fine steps), the area of contact with points all over the edge that no earlier pose has
 contained. Nothing is judged here.
 
-    python benchmarks/five_axis.py            30 cases
+    python benchmarks/five_axis.py            32 cases
     python benchmarks/five_axis.py --small    for CI: below 30 s
 """
 
@@ -14,8 +14,10 @@ import itertools
 import math
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
+from unittest import mock
 
 import numpy as np
 
@@ -264,52 +266,66 @@ def print_upright():
     print("\nUpright tool: dexels beside the height field (D/100)")
     print("| way | cutter | mean force | RMS | µs/sample, height field | µs/sample, dexels |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for tool, (name, tip, axis) in itertools.product(TOOLS[:3], upright_ways()):
+    total_s, samples = np.zeros(2), 0
+    for tool, (name, tip, axis) in itertools.product(TOOLS, upright_ways()):
         case = Case(name, tool, tip, axis)
+        cut(case, tool.diameter_mm / CELLS_PER_DIAMETER)  # the first call of each kind is slow
         found, _, _, own_s = cut(case, tool.diameter_mm / CELLS_PER_DIAMETER)
-        size_mm = tool.diameter_mm / 100.0
-        count = np.ceil((STOCK[1] - STOCK[0])[:2] / size_mm).astype(int)
-        height = np.full(count[::-1], STOCK[1, 2], np.float32)
-        field = HeightField(height, STOCK[0, :2].copy(), (STOCK[1] - STOCK[0])[:2] / count, STOCK[0, 2])
-        rows, none = len(tip), np.zeros(len(tip), np.int32)
-        direction = points_of(case).feed_mm / F_Z_MM
-        start = time.process_time()
-        wanted = engage(
-            field, tip, none, none.astype(bool), np.full(rows, F_Z_MM), [tool], scenes.LAW, 1, direction
-        ).force_N
-        field_s = time.process_time() - start
+        wanted, field_s = cut_upright(case)
         size, own = np.linalg.norm(wanted, axis=1), np.linalg.norm(found.force_N, axis=1)
         off = np.linalg.norm(found.force_N - wanted, axis=1)
+        total_s, samples = total_s + np.array([field_s, own_s]), samples + len(tip)
         print(
             f"| {name} | {tool.kind} | {100 * (own.sum() / size.sum() - 1):+.2f} % "
             f"| {100 * math.sqrt((off**2).sum() / (size**2).sum()):.2f} % "
-            f"| {1e6 * field_s / rows:.0f} | {1e6 * own_s / rows:.0f} |",
+            f"| {1e6 * field_s / len(tip):.0f} | {1e6 * own_s / len(tip):.0f} |",
             flush=True,
         )
+    mean = 1e6 * total_s / samples
+    print(f"all: {mean[0]:.0f} and {mean[1]:.0f} µs a sample, {mean[1] / mean[0]:.1f} times")
+
+
+def cut_upright(case):
+    """Return the forces (n, 3) along a way of an upright tool by the height field, and the processor time."""
+    size_mm = case.tool.diameter_mm / 100.0
+    count = np.ceil((STOCK[1] - STOCK[0])[:2] / size_mm).astype(int)
+    height = np.full(count[::-1], STOCK[1, 2], np.float32)
+    field = HeightField(height, STOCK[0, :2].copy(), (STOCK[1] - STOCK[0])[:2] / count, STOCK[0, 2])
+    rows = len(case.tip)
+    none, direction = np.zeros(rows, np.int32), points_of(case).feed_mm / F_Z_MM
+    f_z_mm = np.full(rows, F_Z_MM)
+    start = time.process_time()
+    found = engage(field, case.tip, none, none.astype(bool), f_z_mm, [case.tool], scenes.LAW, 1, direction)
+    return found.force_N, time.process_time() - start
 
 
 def print_chain():
-    """Print the cost of a whole prediction beside one of an upright tool, and the memory of the dexels."""
+    """Print what a whole prediction costs by the height field and by dexels, and the memory of these."""
     from gcode2krl import load_cell, predict
+    from gcode2krl.cutting.outlook import Watch
 
     print("\nThe whole chain (predict), processor time a sample")
-    folder = ROOT / "examples"
-    for part, cell in (
-        ("test_piece.nc", None),
-        ("five_axis/five_axis.nc", folder / "five_axis" / "cell.toml"),
-    ):
-        known = load_cell(cell) if cell is not None else load_cell()
-        predict(folder / part, known, forces=False)
-        start = time.process_time()
-        prediction = predict(folder / part, known)
-        seconds = time.process_time() - start
-        print(
-            f"{part}: {1e6 * seconds / len(prediction.motion):.0f} µs, {len(prediction.motion)} samples",
-            flush=True,
-        )
-    block = dexel_block(np.array([[0.0, 0.0, 0.0], [300.0, 200.0, 50.0]]), 0.4)
+    folder, outlook = ROOT / "examples", Watch.outlook
+
+    def seconds(part, cell):
+        spent = []
+        for _ in range(3):
+            start = time.process_time()
+            prediction = predict(folder / part, cell)
+            spent.append(time.process_time() - start)
+        return 1e6 * min(spent) / len(prediction.motion)
+
+    known = load_cell()
+    for part in ("test_piece.nc", "cam_style.nc"):
+        field_us = seconds(part, known)
+        with mock.patch.object(Watch, "outlook", lambda watch: replace(outlook(watch), turns=True)):
+            dexels_us = seconds(part, known)
+        print(f"{part}: {field_us:.0f} µs, by dexels {dexels_us:.0f} µs", flush=True)
+    turning_us = seconds("five_axis/five_axis.nc", load_cell(folder / "five_axis" / "cell.toml"))
+    print(f"five_axis/five_axis.nc: {turning_us:.0f} µs", flush=True)
+    block = dexel_block(np.array([[0.0, 0.0, 0.0], [300.0, 200.0, 50.0]]), 0.5)
     size = sum(column.nbytes for column in block)
-    print(f"memory: {len(block.filled):,} rays of 300 x 200 x 50 mm at 0.4 mm cells, {size / 1e6:.0f} MB")
+    print(f"memory: {len(block.filled):,} rays of 300 x 200 x 50 mm at 0.5 mm cells, {size / 1e6:.0f} MB")
 
 
 def main():
