@@ -2,7 +2,7 @@
 
 A dexel is a ray along an axis of ``$BASE`` through the middle of a cell, with the stretches of it that are
 material. Each end has the normal of the surface there, so that a surface is known between rays to the second
-order in a cell: cells may be twice as wide as those of a height field for the same force.
+order in a cell: cells may be three times as wide as those of a height field for the same force.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,7 +22,7 @@ SIDE = 4
 MOST = 32
 """Stretches of material that a ray may have."""
 CELLS_PER_DIAMETER = 32.0
-"""Default resolution: 0.4 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
+"""Default resolution: 0.5 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
 MAX_RAYS = 8_000_000
 _FEW = 2
 _SHORTENED = 127
