@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import Gcode2KrlError, load_cell, predict, read_gcode, set_targets, write_krl
 from gcode2krl.cell.sections import Machine
+from gcode2krl.cutting import history_of, remove
+from gcode2krl.errors import RefusedError
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "five_axis"
 PART, CELL = EXAMPLE / "five_axis.nc", EXAMPLE / "cell.toml"
@@ -77,21 +79,50 @@ def test_between_blocks_the_tool_turns_as_the_table_does():
     assert np.degrees(steps.sum()) == pytest.approx(352.5, abs=8.0)
 
 
-def test_the_example_is_translated_and_says_what_is_not_predicted(run, tmp_path):
+def test_the_example_is_translated_with_forces(run, tmp_path):
     done = run(PART, "--cell", CELL, "-o", "part.src")
     assert done.code == 0, done.err
-    assert "collisions with the stock are not predicted" in done.err
+    assert "not predicted" not in done.err
     head = (tmp_path / "part.src").read_text().split(";ENDFOLD")[0]
-    assert "material removal (rapids through stock" in head
+    assert "material removal (rapids through stock" not in head
     assert run("verify", "part.src", PART, "--cell", CELL).code == 0
 
 
-def test_predict_leaves_out_forces_with_a_word():
-    prediction = predict(PART, load_cell(CELL))
-    assert prediction.forces is None
-    assert any(issue.code == "axis-changes" for issue in prediction.issues)
+def test_no_robot_is_moved_by_forces_of_a_turning_axis(run, tmp_path):
+    done = run(PART, "--cell", CELL, "-o", "part.src")
+    assert "carries no pilot force: the tool axis turns" in done.err
+    assert not (tmp_path / "part.pilot.csv").exists()
+    assert "$SEN_PINT" not in (tmp_path / "part.src").read_text()
+    for asked in (["--pilot", "index"], ["--pilot", "values"], ["--compensate", "offline"]):
+        done = run(PART, "--cell", CELL, "-o", "other.src", *asked)
+        assert done.code == 1
+        assert "[axis-turns]" in done.err
+        assert not (tmp_path / "other.src").exists()
+
+
+def test_predict_has_forces_and_says_what_is_less_sure():
+    cell = load_cell(CELL)
+    prediction = predict(PART, cell)
+    assert [issue.code for issue in prediction.issues if issue.code.startswith("axis-")] == ["axis-turns"]
+    assert prediction.forces.relative_band == pytest.approx(np.hypot(cell.material.relative_band, 0.2))
     axis = Rotation.from_quat(prediction.motion.rotation).apply([0.0, 0.0, 1.0])
     assert np.degrees(np.arccos(axis[:, 2])).max() < 21.0
+    line = prediction.toolpath.source_line[prediction.motion.move]
+    force_N = np.linalg.norm(prediction.forces.force_base_N, axis=1)
+    on_cone = (line > 24) & (line < 45)
+    assert np.median(force_N[on_cone]) > 100.0
+    # round the cone the force goes round with the tool, its size stays
+    assert force_N[on_cone].std() < 0.1 * force_N[on_cone].mean()
+    assert np.isfinite(prediction.deflection.deflection_base_mm[on_cone]).all()
+
+
+def test_what_needs_one_height_is_refused(tmp_path):
+    cell = load_cell(CELL)
+    prediction = predict(PART, cell)
+    with pytest.raises(RefusedError, match="the tool axis changes"):
+        history_of(prediction.toolpath, prediction.motion, cell)
+    with pytest.raises(RefusedError, match="the tool axis changes"):
+        _ = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).part
 
 
 def test_a_tilted_tool_leaves_along_its_axis():

@@ -20,6 +20,7 @@ from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.chain import Plan
 from gcode2krl.compensation.correction import SETTLED_MM, Contact, Shift, interpolated, wanted_correction
 from gcode2krl.compensation.intended_path import Deviation, Evaluated, Placed, Ways, deviation_from
+from gcode2krl.cutting.outlook import unproven
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.pipeline import plan_motion
 from gcode2krl.tables import Deflection, Forces, Motion, Targets, Toolpath
@@ -78,11 +79,14 @@ def compensate(
     NotUnderstoodError
         Where the tolerance is not positive.
     RefusedError
-        Where the deflection is too unsure (see `refuse_unsure`), a correction is larger than
-        `MOST_CORRECTION_MM`, or the rounds do not settle.
+        Where the tool axis turns, the deflection is too unsure (see `refuse_unsure`), a correction is larger
+        than `MOST_CORRECTION_MM`, or the rounds do not settle.
     """
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive", "0.01 is usual")
+    refusal = unproven(targets)
+    if refusal is not None:
+        raise RefusedError(refusal)
     ways = Ways.of(toolpath, targets, cell)
     evaluate = _keeping_forces(ways, targets, motion, forces, cell)
     first = evaluate(targets)

@@ -291,7 +291,7 @@ def _outline(shape: Shape) -> tuple[float, ...]:
 
 def _cutters(tools: Sequence[Tool], cell_mm: float) -> Cutters:
     """Return what the core needs of tools on a field of a cell size."""
-    listed = [_bands(tool, cell_mm) for tool in tools]
+    listed = [bands_of(tool, cell_mm) for tool in tools]
     bands = np.zeros((len(tools), max(len(edge) for edge in listed), BAND_COLUMNS))
     for row, edge in zip(bands, listed, strict=True):
         row[: len(edge)] = edge
@@ -312,7 +312,7 @@ def _round_up(bins: Floats) -> Ints:
     return (_BINS * np.ceil(bins / _BINS)).astype(np.int64)
 
 
-def _bands(tool: Tool, cell_mm: float) -> Floats:
+def bands_of(tool: Tool, cell_mm: float) -> Floats:
     """Return the edge in bands (s, 7) from the axis outwards, as fine as the cells resolve."""
     shape = shape_of(tool)
     long_mm = shape.corner_mm * shape.kappa_rad

@@ -65,6 +65,7 @@ def history_of(
         Where the tool axis changes within the program.
     """
     outlook = outlook_of([motion])
+    outlook.require_one_axis("how the part comes about is not shown")
     fine, to_field = raw_field(toolpath, motion, cell)
     field, side = _coarse(fine, most_blocks)
     grid, raw_mm = field.grid(0, 0, field.height_mm.shape[1]), _means(field, side)

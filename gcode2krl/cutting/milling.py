@@ -1,7 +1,9 @@
 """The stage: Motion and stock to Forces, and the findings of the material removal."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,17 +11,19 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
+from gcode2krl.cutting.dexels import Dexels
 from gcode2krl.cutting.engagement import NODES_PER_DIAMETER, Engaged, Engagement
 from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
-from gcode2krl.cutting.outlook import Outlook, outlook_of, turned
-from gcode2krl.cutting.raw_part import height_field_of
+from gcode2krl.cutting.outlook import Outlook, axis_changes, outlook_of, turned
+from gcode2krl.cutting.raw_part import dexels_of, height_field_of
 from gcode2krl.cutting.reading import Result
 from gcode2krl.cutting.records import copied, followed, taken
-from gcode2krl.cutting.stock_checks import StockChecks, Work
+from gcode2krl.cutting.stock_checks import StockChecks, TurnedStockChecks, Work
 from gcode2krl.cutting.tool_use import Uses
+from gcode2krl.cutting.turned import TurnedEngagement, TurnedPoints
 from gcode2krl.cutting.way import Points
 from gcode2krl.errors import Issue, input_error
 from gcode2krl.tables import BLOCK_ROWS, Forces, Gathered, Motion, Toolpath, blocks_of, lengths
@@ -122,6 +126,17 @@ def _parabola_length(cosine: Floats) -> Floats:
     return 1.0 + low**2 / half * np.arctanh(np.minimum(half, 1.0 - 1e-12))
 
 
+TURNED_BAND = 0.2
+"""Half-width of the band that a turning axis adds to that of the material, in quadrature: assumed. The edge
+near the tip of a tilted ball drags at almost no speed, which no coefficient was fitted to."""
+_AXIS_TURNS = Issue(
+    "note",
+    "axis-turns",
+    0,
+    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, peaks are upper bounds, and the "
+    "finished part is not shown",
+)
+_APPROACH_MM = 1e-3
 _ARC_COLUMNS = 6
 _SHANK_MM = 1.0
 _CDIS_OF_TOLERANCE = 2.0 * 2.0**0.5
@@ -133,10 +148,17 @@ class Removal:
     """The result of `remove`."""
 
     forces: Forces
-    part: HeightField
-    """The material that is left."""
+    left: HeightField | Dexels
+    """The material that is left; dexels where the tool axis turns."""
     to_field: Floats
-    """(3, 3) rotation from ``$BASE`` to the frame of ``part``."""
+    """(3, 3) rotation from ``$BASE`` to its frame."""
+
+    @property
+    def part(self) -> HeightField:
+        """What is left as a height field; raises `RefusedError` where the tool axis turns."""
+        if isinstance(self.left, HeightField):
+            return self.left
+        raise axis_changes("the finished part has no single height above a place")
 
 
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
@@ -150,9 +172,6 @@ def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
     ------
     NotUnderstoodError
         Where the stock cannot be read, or the material has no force law.
-    RefusedError
-        Where the tool axis changes within the program: one height field holds one direction.
-
     Examples
     --------
     >>> from gcode2krl import cut, load_cell, plan_motion, read_gcode
@@ -247,10 +266,8 @@ class Approach(NamedTuple):
     """Samples that are about to be cut."""
 
     rows: _UncutSamples
-    points: Points
-    """The way along them."""
-    ends: bool
-    """True where the motion ends with them."""
+    cut: Callable[[], Engaged]
+    """Cuts along them, and returns what is read."""
 
 
 class Contact(NamedTuple):
@@ -290,19 +307,29 @@ class Milling:
         self._tools = [cell.tool[number] for number in outlook.numbers]
         self._teeth = np.array([one.teeth for one in self._tools])
         self._flutes_mm = np.array([one.flute_length_mm or np.inf for one in self._tools])
-        field = height_field_of(toolpath, cell, outlook.to_field, self._tools)
-        self._before = _uncut(field)
         shanks = [_with_shank(one) for one in self._tools]
-        places_mm = outlook.places_mm
-        self._engagement = Engagement(field, shanks, self._law, places_mm, threads, nodes_per_diameter)
+        is_raw, self._dt_s = toolpath.restart is None, dt_s
+        checks: StockChecks | TurnedStockChecks
+        if outlook.turns:
+            dexels, self._is_guessed = dexels_of(toolpath, cell, self._tools)
+            self._engagement: Engagement | TurnedEngagement = TurnedEngagement(dexels, shanks, self._law)
+            self._band = math.hypot(self._band, TURNED_BAND)
+            self._low_mm, self._high_mm = dexels.low_mm, dexels.low_mm + dexels.cells * dexels.cell_mm
+            stock = None if self._is_guessed else cell.stock
+            checks = TurnedStockChecks(self._tools, outlook.numbers, stock, self._low_mm, self._high_mm)
+        else:
+            field = height_field_of(toolpath, cell, outlook.to_field, self._tools)
+            self._before, self._is_guessed = _uncut(field), field.guessed
+            places_mm = outlook.places_mm
+            self._engagement = Engagement(field, shanks, self._law, places_mm, threads, nodes_per_diameter)
+            self._low_mm, self._high_mm = _box_of(self._before)
+            checks = StockChecks(self._tools, outlook, cell.stock, self._before, is_raw)
         self._checks: _Checks | None = None
         if is_checked:
             blend_mm = _largest_cdis(toolpath, cell)
-            self._checks = _Checks(
-                Findings(cell, outlook.numbers, field.guessed, blend_mm, dt_s),
-                StockChecks(self._tools, outlook, cell.stock, self._before, toolpath.restart is None),
-                Uses(cell, outlook.numbers),
-            )
+            findings = Findings(cell, outlook.numbers, self._is_guessed, blend_mm, dt_s)
+            self._checks = _Checks(findings, checks, Uses(cell, outlook.numbers))
+        self._last_axis = np.zeros((0, 3))
         self._last: _UncutSamples | None = None
         self._waiting: _UncutSamples | None = None
         self._peaks = _Peaks(self._tools, self._law) if is_checked and has_peaks else None
@@ -319,13 +346,18 @@ class Milling:
     def approached(self, motion: Motion, ends: bool) -> Approach:
         """Return what is known of the next samples before they are cut."""
         rows = self._rows(motion)
-        points = self._points(rows)
+        engagement = self._engagement
+        cut = (
+            partial(engagement.take, self._points(rows), ends)
+            if isinstance(engagement, Engagement)
+            else partial(engagement.take, self._turned_points(rows, tool_axes(motion)), ends)
+        )
         self._last = copied(rows, slice(-1, None))
-        return Approach(rows, points, ends)
+        return Approach(rows, cut)
 
     def touched(self, approach: Approach) -> Contact:
         """Cut along the next samples."""
-        return Contact(approach.rows, self._engagement.take(approach.points, approach.ends))
+        return Contact(approach.rows, approach.cut())
 
     def loaded(self, contact: Contact) -> Forces:
         """Return the forces at the samples that are done, and take what is found of them."""
@@ -338,15 +370,12 @@ class Milling:
 
     def issues(self) -> tuple[Issue, ...]:
         """Return what was found, by line."""
-        return self._checks.issues() if self._checks is not None else ()
+        found = self._checks.issues() if self._checks is not None else ()
+        return (*found, _AXIS_TURNS) if isinstance(self._engagement, TurnedEngagement) else found
 
     def raw_box(self) -> RawBox:
         """Return the box around the material before the first cut."""
-        field = self._before
-        size = np.array(field.height_mm.shape[::-1]) * field.cell_mm
-        low = np.append(field.origin_mm, field.bottom_mm)
-        high = np.append(field.origin_mm + size, float(field.height_mm.max()))
-        return RawBox(low, high, self._to_field, field.guessed)
+        return RawBox(self._low_mm, self._high_mm, self._to_field, self._is_guessed)
 
     def bodies_in(self, ends_mm: Floats, radius_mm: Floats) -> tuple[Floats, Floats]:
         """Return how deep capsules (n) are in what stands now, 0 where they are not, and where (n, 3).
@@ -357,8 +386,10 @@ class Milling:
         depth, place = self._engagement.bodies_in(ends, radius_mm)
         return depth, turned(place, self._to_field.T)
 
-    def part(self) -> HeightField:
+    def part(self) -> HeightField | Dexels:
         """Return the material that is left."""
+        if isinstance(self._engagement, TurnedEngagement):
+            return self._engagement.dexels
         field = self._before.copy()
         self._engagement.write_back(field)
         return field
@@ -387,8 +418,8 @@ class Milling:
             descent_mm=np.maximum(-steps[:, 2], 0.0),
         )
 
-    def _points(self, rows: _UncutSamples) -> Points:
-        """Return the path of the tip, with the turns between samples."""
+    def _way(self, rows: _UncutSamples) -> tuple[_UncutSamples, Shaped, slice, Bools]:
+        """Return samples behind the last one, the path of the tip, what of it is new, and what is rapid."""
         last = self._last
         if last is not None:
             rows = followed(last, rows)
@@ -396,7 +427,11 @@ class Milling:
         way = shaped(rows.position_mm, rows.direction, rows.path_mm, is_joined)
         # the sweep to the first sample of a rapid move began on the feed move before it
         wholly_rapid = rows.rapid & np.concatenate([rows.rapid[:1], rows.rapid[:-1]])
-        new = slice(0 if last is None else 1, None)
+        return rows, way, slice(0 if last is None else 1, None), wholly_rapid
+
+    def _points(self, rows: _UncutSamples) -> Points:
+        """Return the path of the tip, with the turns between samples."""
+        rows, way, new, wholly_rapid = self._way(rows)
         owner = way.sample[new]
         return Points(
             position_mm=way.position_mm[new],
@@ -406,6 +441,35 @@ class Milling:
             f_z_mm=rows.f_z_mm[owner],
             wanted=way.read[new],
         )
+
+    def _turned_points(self, rows: _UncutSamples, axis: Floats) -> TurnedPoints:
+        """Return the path of a tool whose axis is (m, 3) at samples."""
+        begins = self._last is None
+        if self._checks is not None and isinstance(self._checks.stock, TurnedStockChecks):
+            self._checks.stock.pass_by(rows.position_mm, axis, rows.tool, rows.source_line, rows.feed)
+        rows, way, new, wholly_rapid = self._way(rows)
+        axis = np.concatenate([self._last_axis, axis])
+        self._last_axis = axis[-1:].copy()
+        tooth_s = feed_per_tooth(1.0, rows.spindle_rad_s, 1) / self._teeth[rows.tool]
+        rate = np.diff(axis, axis=0, prepend=axis[:1]) / (self._dt_s or 1.0)
+        owner = way.sample[new]
+        points = TurnedPoints(
+            position_mm=way.position_mm[new],
+            axis=_axes_between(axis, way)[new],
+            feed_mm=(rows.f_z_mm[:, None] * rows.direction)[owner],
+            swing=(tooth_s[:, None] * rate)[owner],
+            tool=rows.tool[owner],
+            rapid=wholly_rapid[owner],
+            wanted=way.read[new],
+        )
+        if not begins or not len(owner) or not rows.rapid[0]:
+            return points
+        # the approach, a rapid along the axis, ends at the first sample
+        first = taken(points, slice(0, 1))
+        above = first._replace(
+            position_mm=first.position_mm + _APPROACH_MM * first.axis, wanted=np.zeros(1, bool)
+        )
+        return followed(above, points._replace(rapid=np.append(True, points.rapid[1:])))
 
     def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:
         found, checks = engaged.result, self._checks
@@ -437,7 +501,7 @@ class _Checks:
     """What is found on the way."""
 
     findings: Findings
-    stock: StockChecks
+    stock: StockChecks | TurnedStockChecks
     uses: Uses
 
     def take(self, rows: _UncutSamples, engaged: Engaged, overlap_mm: Floats, forces: Forces) -> None:
@@ -471,6 +535,7 @@ def raw_field(toolpath: Toolpath, motion: Motion, cell: Cell) -> tuple[HeightFie
     Second the rotation (3, 3) from ``$BASE`` to its frame. Raises what `cut` raises.
     """
     outlook = outlook_of([motion])
+    outlook.require_one_axis("what one program leaves to another is not known")
     tools = [cell.tool[number] for number in outlook.numbers]
     return height_field_of(toolpath, cell, outlook.to_field, tools), outlook.to_field
 
@@ -479,6 +544,31 @@ def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:
     """Return the largest CDIS that tolerances need at corners of 90° and wider, or the cell's."""
     tolerances = np.append(toolpath.tolerance_mm, cell.controller.tolerance_mm or 0.0)
     return max(cell.controller.cdis_mm, _CDIS_OF_TOLERANCE * float(np.nanmax(tolerances)))
+
+
+def tool_axes(motion: Motion) -> Floats:
+    """Return the tool axis (m, 3) at each sample, from tip to holder in ``$BASE``."""
+    x, y, z, w = motion.rotation.T
+    columns = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _axes_between(axis: Floats, way: Shaped) -> Floats:
+    """Return the axis (k, 3) on a way: between two samples in even parts from one to the other."""
+    row = np.arange(len(way.read))
+    at = np.interp(row, row[way.read], way.sample[way.read].astype(np.float64))
+    low = np.clip(at.astype(np.int64), 0, max(len(axis) - 2, 0))
+    share = (at - low)[:, None]
+    between = axis[low] + share * (axis[np.minimum(low + 1, len(axis) - 1)] - axis[low])
+    unit: Floats = between / lengths(between)[:, None]
+    return unit
+
+
+def _box_of(field: HeightField) -> tuple[Floats, Floats]:
+    """Return the corners (3,) of the box around the material of a field."""
+    size = np.array(field.height_mm.shape[::-1]) * field.cell_mm
+    low = np.append(field.origin_mm, field.bottom_mm)
+    return low, np.append(field.origin_mm + size, float(field.height_mm.max()))
 
 
 def _uncut(field: HeightField) -> HeightField:

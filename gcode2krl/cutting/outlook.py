@@ -8,7 +8,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.tables import Motion
+from gcode2krl.tables import Motion, Targets
 
 _SAME_AXIS = 1e-9
 _EVERY = 64
@@ -20,13 +20,43 @@ class Outlook:
     """A glance at a motion."""
 
     to_field: Floats
-    """(3, 3) rotation from ``$BASE`` to a frame whose z is the tool axis."""
+    """(3, 3) rotation from ``$BASE`` to a frame whose z is the tool axis, none where it turns."""
     numbers: tuple[int, ...]
     """Tools that move, rising."""
     lowest_mm: tuple[float, ...]
     """The lowest tip of each, in that frame."""
     places_mm: Floats
     """(o, 3) points all over the path, in that frame."""
+    turns: bool = False
+    """True where the tool axis changes: one height field cannot hold what is cut."""
+
+    def require_one_axis(self, what: str) -> None:
+        """Raise `RefusedError` where the tool axis changes; ``what`` is not done then."""
+        if self.turns:
+            raise axis_changes(what)
+
+
+def axis_changes(what: str) -> RefusedError:
+    """Return the refusal of ``what`` needs one tool axis."""
+    sentence, remedy = f"the tool axis changes: {what}", "split the program by set-up directions"
+    return RefusedError(Issue("error", "axis-changes", 0, sentence, remedy))
+
+
+def unproven(targets: Targets) -> Issue | None:
+    """Return why no robot is moved by predicted forces, None where the tool axis of targets stays.
+
+    Forces of a turning axis were held against solids and against a constant axis, never against a measured
+    cut.
+    """
+    rotation = targets.rotation[targets.move >= 0]
+    if not len(rotation) or not _leaves(rotation, fr.rotation_from_quaternion(rotation[:1])[0][:, 2]):
+        return None
+    sentence = (
+        "the tool axis turns, and forces there were never compared with a measured cut: no robot is moved "
+        "by them"
+    )
+    remedy = "leave out --pilot and --compensate, or split the program by set-up directions"
+    return Issue("error", "axis-turns", 0, sentence, remedy)
 
 
 class Watch:
@@ -55,20 +85,11 @@ class Watch:
         self._places_mm.append(turned(motion.position_mm[::_EVERY], self._to_field))
 
     def outlook(self) -> Outlook:
-        """Return what was seen; raises `RefusedError` where the tool axis changes."""
-        if self._turns:
-            raise RefusedError(
-                Issue(
-                    "error",
-                    "axis-changes",
-                    0,
-                    "the tool axis changes: forces and collisions with the stock are not predicted",
-                    "check stock and shank in the CAM, or split the program by set-up directions",
-                )
-            )
+        """Return what was seen."""
         numbers = tuple(sorted(self._lowest_mm))
         lowest_mm = tuple(self._lowest_mm[number] for number in numbers)
-        return Outlook(self._to_field, numbers, lowest_mm, np.concatenate(self._places_mm))
+        to_field = np.eye(3) if self._turns else self._to_field
+        return Outlook(to_field, numbers, lowest_mm, np.concatenate(self._places_mm), self._turns)
 
 
 def outlook_of(blocks: Iterable[Motion]) -> Outlook:

@@ -14,6 +14,8 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import shape_of
+from gcode2krl.cutting.dexels import CELLS_PER_DIAMETER as DEXELS_PER_DIAMETER
+from gcode2krl.cutting.dexels import Dexels, dexel_block, dexel_mesh
 from gcode2krl.cutting.guess import guessed_box
 from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, HeightField
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
@@ -66,6 +68,20 @@ def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: lis
     radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
     box = guessed_box(toolpath, to_field, radius_mm, edges_mm)
     return block(box, _resolution(box, tools, own_mm), guessed=True)
+
+
+def dexels_of(toolpath: Toolpath, cell: Cell, tools: list[Tool]) -> tuple[Dexels, bool]:
+    """Return the raw part as dexels, and whether it is guessed; arguments and errors as above."""
+    stock, smallest_mm = cell.stock, min(tool.diameter_mm for tool in tools)
+    cell_mm = stock.resolution_mm if stock is not None and stock.resolution_mm is not None else None
+    if cell_mm is None:
+        cell_mm = smallest_mm / DEXELS_PER_DIAMETER
+    if stock is not None and stock.mesh is not None:
+        return dexel_mesh(load_mesh(Path(stock.mesh)), cell_mm), False
+    if stock is not None and stock.box_mm is not None:
+        return dexel_block(np.array(stock.box_mm), cell_mm), False
+    radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
+    return dexel_block(guessed_box(toolpath, np.eye(3), radius_mm, edges_mm), cell_mm), True
 
 
 def _edges_mm(tool: Tool) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell.sections import Stock, Tool
-from gcode2krl.cutting.cutter import outline
+from gcode2krl.cutting.cutter import outline, shape_of
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.outlook import Outlook
 from gcode2krl.errors import Issue
@@ -83,13 +83,7 @@ class StockChecks:
         if self._before.guessed or self._stock is None:
             return
         if not self._touches and self._first_feed is not None:
-            yield Issue(
-                "error",
-                "stock-untouched",
-                self._first_feed,
-                "no feed move touches the stock that the cell states",
-                "check the work offset (G54 to G59), the zero point and [stock]",
-            )
+            yield _untouched(self._first_feed)
         yield from self._undersides(self._stock)
 
     def _approached(self, work: Work) -> Iterator[Issue]:
@@ -139,16 +133,77 @@ class StockChecks:
     def _undersides(self, stock: Stock) -> Iterator[Issue]:
         for number, depth in zip(self._numbers, self._below, strict=True):
             if depth is not None and depth.line is not None:
-                through = f" and {stock.through_mm:g} mm are allowed" if stock.through_mm else ""
-                depth_mm = depth.worst_mm + stock.through_mm
-                yield Issue(
-                    "error",
-                    "stock-underside",
-                    depth.line,
-                    f"T{number} cuts up to {depth_mm:.2f} mm below the stock's underside{through}",
-                    f"check Z; [stock] through_mm = {np.ceil(depth_mm * 10.0) / 10.0:g} allows it above a "
-                    "sacrificial board",
-                )
+                yield _cut_through(number, depth.line, depth.worst_mm, stock)
+
+
+class TurnedStockChecks:
+    """The same of a tool whose axis turns: whether it touches the stock, and how far it goes below it."""
+
+    def __init__(
+        self,
+        tools: Sequence[Tool],
+        numbers: Sequence[int],
+        stock: Stock | None,
+        low_mm: Floats,
+        high_mm: Floats,
+    ) -> None:
+        """Take the tools, what the cell states (None: a guess), and the corners (3,) of the stock."""
+        self._shapes, self._numbers = [shape_of(tool) for tool in tools], numbers
+        self._stock, self._low_mm, self._high_mm = stock, low_mm, high_mm
+        self._touches = False
+        self._first_feed: int | None = None
+        self._worst: dict[int, tuple[int, float]] = {}
+        """By number of the tool: the first line below the underside, and the largest depth."""
+
+    def pass_by(self, position_mm: Floats, axis: Floats, tool: Ints32, line: Ints32, feed: Bools) -> None:
+        """Judge the next samples (m) by where the lowest point of the edge is."""
+        if self._stock is None:
+            return
+        aside = np.sqrt(np.maximum(1.0 - axis[:, 2] ** 2, 0.0))
+        for row, (shape, number) in enumerate(zip(self._shapes, self._numbers, strict=True)):
+            edge_mm = shape.bottom_mm * aside + shape.corner_mm * (1.0 - axis[:, 2])
+            depth_mm = self._low_mm[2] - self._stock.through_mm - (position_mm[:, 2] - edge_mm)
+            margin_mm = shape.radius_mm
+            over = (position_mm[:, :2] > self._low_mm[:2] - margin_mm).all(axis=1)
+            over &= (position_mm[:, :2] < self._high_mm[:2] + margin_mm).all(axis=1)
+            low = np.flatnonzero(over & feed & (tool == row) & (depth_mm > _CONTACT_MM))
+            if len(low):
+                first, worst = self._worst.get(number, (int(line[low[0]]), 0.0))
+                self._worst[number] = first, max(worst, float(depth_mm[low].max()))
+
+    def take(self, work: Work) -> None:
+        """Note whether the next samples touch the stock."""
+        if self._first_feed is None and work.feed.any():
+            self._first_feed = int(work.source_line[np.argmax(work.feed)])
+        self._touches |= bool((work.engaged & work.feed).any())
+
+    def issues(self) -> Iterator[Issue]:
+        """Yield the findings."""
+        if self._stock is None:
+            return
+        if not self._touches and self._first_feed is not None:
+            yield _untouched(self._first_feed)
+        for number, (line, depth_mm) in sorted(self._worst.items()):
+            yield _cut_through(number, line, depth_mm, self._stock)
+
+
+def _untouched(line: int) -> Issue:
+    sentence = "no feed move touches the stock that the cell states"
+    remedy = "check the work offset (G54 to G59), the zero point and [stock]"
+    return Issue("error", "stock-untouched", line, sentence, remedy)
+
+
+def _cut_through(number: int, line: int, worst_mm: float, stock: Stock) -> Issue:
+    through = f" and {stock.through_mm:g} mm are allowed" if stock.through_mm else ""
+    depth_mm = worst_mm + stock.through_mm
+    return Issue(
+        "error",
+        "stock-underside",
+        line,
+        f"T{number} cuts up to {depth_mm:.2f} mm below the stock's underside{through}",
+        f"check Z; [stock] through_mm = {np.ceil(depth_mm * 10.0) / 10.0:g} allows it above a "
+        "sacrificial board",
+    )
 
 
 class _Depth:

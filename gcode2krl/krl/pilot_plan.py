@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 
+from gcode2krl.cutting.outlook import unproven
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl.announce import Form, PilotPlan, Planner, TimedMotions
 from gcode2krl.pilot import Knots
@@ -25,8 +26,9 @@ def plan_pilot(
     for raises `RefusedError`; one that was not ends before that place, with a warning, and where nothing is
     left of it the warning is returned instead.
     """
+    outcome: PilotPlan | Issue
     try:
-        outcome = _fitting(Planner(source, joints, form, sidecar), asked)
+        outcome = unproven(source.targets) or _fitting(Planner(source, joints, form, sidecar), asked)
     except RefusedError as error:  # the motion is not that of the targets
         outcome = error.issues[0]
     if not isinstance(outcome, Issue):

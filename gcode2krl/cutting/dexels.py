@@ -1,0 +1,202 @@
+"""Material as three fields of dexels: what a tool may cut from any side.
+
+A dexel is a ray along an axis of ``$BASE`` through the middle of a cell, with the stretches of it that are
+material. Each end has the normal of the surface there, so that a surface is known between rays to the second
+order in a cell: cells may be three times as wide as those of a height field for the same force.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcode2krl.arrays import Floats, Ints, Ints32
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, StructOf, core_function
+from gcode2krl.errors import input_error
+
+if TYPE_CHECKING:
+    import trimesh
+
+SIDE = 4
+"""Rays along one side of a block with a common bound of its ends."""
+MOST = 32
+"""Stretches of material that a ray may have."""
+CELLS_PER_DIAMETER = 32.0
+"""Default resolution: 0.5 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
+MAX_RAYS = 8_000_000
+_FEW = 2
+_SHORTENED = 127
+
+
+class Dexels(NamedTuple):
+    """Three fields of rays, along x, y and z; a ray's row and column count cells of the next two axes.
+
+    They change while they are cut; lengths in mm, in ``$BASE``.
+    """
+
+    ends: NDArray[np.float32]
+    """(rays, 2k) where material begins and ends, in pairs."""
+    facing: Ints32
+    """(rays, 2k) normal of the surface out of the material at each end, three signed bytes."""
+    filled: Ints32
+    """(rays,) stretches that a ray has."""
+    bound: NDArray[np.float32]
+    """(blocks, 2) lowest and highest end in a block."""
+    low_mm: Floats
+    """(3,) low corner of the box around the material."""
+    cell_mm: Floats
+    """(3,)"""
+    cells: Ints
+    """(3,) how many there are along each axis."""
+
+    @property
+    def volume_mm3(self) -> float:
+        """Volume of the material."""
+        return float(_volume(self))
+
+    def copy(self) -> "Dexels":
+        """Return dexels that can be cut without changing these."""
+        return self._replace(**{name: getattr(self, name).copy() for name in _CUT})
+
+    def with_room(self) -> "Dexels":
+        """Return the same with room for twice as many stretches on a ray; raises where that is too many."""
+        room = 2 * self.ends.shape[1]
+        if room > 2 * MOST:
+            raise input_error(
+                "stock-large",
+                f"a line through the stock meets material more than {MOST} times",
+                "state a coarser [stock] resolution_mm",
+            )
+        more = ((0, 0), (0, self.ends.shape[1]))
+        return self._replace(ends=np.pad(self.ends, more), facing=np.pad(self.facing, more))
+
+    def depths(self, places_mm: Floats) -> Floats:
+        """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""
+        depth = np.empty(len(places_mm))
+        _depths(self, np.ascontiguousarray(places_mm), near_of(self), depth)
+        return depth
+
+    def bodies_in(self, ends_mm: Floats, radius_mm: Floats) -> tuple[Floats, Floats]:
+        """Return how deep capsules (n), ends (n, 6), are in the material, 0 where not, and where (n, 3)."""
+        depth, place = np.empty(len(ends_mm)), np.empty((len(ends_mm), 3))
+        _bodies(self, np.ascontiguousarray(ends_mm), np.ascontiguousarray(radius_mm), depth, place)
+        return depth, place
+
+
+DEXELS = StructOf.record(Dexels, written=("ends", "facing", "filled", "bound"))
+_CUT = ("ends", "facing", "filled", "bound")
+_bound = core_function("cutting_bound_dexels", DEXELS)
+_depths = core_function("cutting_depths", DEXELS, FLOATS, FLOAT, OUT_FLOATS)
+_volume = core_function("cutting_dexel_volume", DEXELS, returns=FLOAT)
+_bodies = core_function("cutting_bodies_dexels", DEXELS, FLOATS, FLOATS, OUT_FLOATS, OUT_FLOATS)
+
+
+def near_of(dexels: Dexels) -> float:
+    """Return how far from a surface the depth in material is known."""
+    return 2.0 * float(dexels.cell_mm.max())
+
+
+def dexel_block(box_mm: Floats, cell_mm: float) -> Dexels:
+    """Return a block (2, 3) as dexels whose cells of about ``cell_mm`` fill it exactly."""
+    empty = _empty(np.asarray(box_mm, dtype=np.float64), cell_mm)
+    firsts = _firsts(empty.cells)
+    for axis in range(3):
+        rays = slice(firsts[axis], firsts[axis + 1])
+        empty.ends[rays, :2] = box_mm[0][axis], box_mm[1][axis]
+        normals = np.zeros((2, 3))
+        normals[:, axis] = -1.0, 1.0
+        empty.facing[rays, :2] = _packed(normals)
+    empty.filled[:] = 1
+    _bound(empty)
+    return empty
+
+
+def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
+    """Return a closed mesh as dexels: each ray begins and ends where it passes a triangle."""
+    dexels = _empty(np.array(mesh.bounds, dtype=np.float64), cell_mm)
+    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
+    firsts, crossings = _firsts(dexels.cells), []
+    for axis in range(3):
+        ray, at, normal = _crossed(triangles, axis, dexels)
+        crossings.append((ray + firsts[axis], at, normal))
+    ray, at, normal = (np.concatenate(column) for column in zip(*crossings, strict=True))
+    order = np.lexsort((at, ray))
+    ray, at, normal = ray[order], at[order], normal[order]
+    count = np.bincount(ray, minlength=firsts[3])
+    while dexels.ends.shape[1] < count.max(initial=0):
+        dexels = dexels.with_room()
+    number = np.arange(len(ray)) - np.repeat(np.cumsum(count) - count, count)
+    dexels.ends[ray, number] = at
+    dexels.facing[ray, number] = _packed(normal)
+    dexels.filled[:] = count // 2
+    _bound(dexels)
+    return dexels
+
+
+def _crossed(triangles: Floats, axis: int, dexels: Dexels) -> tuple[Ints, Floats, Floats]:
+    """Return rays (c,) of a field, where they pass triangles (t, 3, 3), and the normals (c, 3) there.
+
+    A ray on the edge of two triangles passes one of them: points are never on the line of an edge, as rays
+    are a little beside the middles of cells, by shares of a cell that no mesh has.
+    """
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    low, size, cells = dexels.low_mm, dexels.cell_mm, dexels.cells
+    beside = {u: 0.5 + 1.234567e-5, v: 0.5 + 2.345678e-5}
+    rays, places, normals = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros((0, 3))]
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    for corners, normal in zip(triangles, across, strict=True):
+        if abs(normal[axis]) < 1e-12:
+            continue
+        spans = {}
+        for k in (u, v):
+            at = (corners[:, k] - low[k]) / size[k] - beside[k]
+            spans[k] = np.arange(max(int(np.ceil(at.min())), 0), min(int(at.max()) + 1, cells[k]))
+        x = low[u] + (spans[u] + beside[u]) * size[u]
+        y = (low[v] + (spans[v] + beside[v]) * size[v])[:, None]
+        inside = np.ones((len(spans[v]), len(spans[u])), dtype=np.bool_)
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            p, q = corners[a], corners[b]
+            side = (q[u] - p[u]) * (y - p[v]) - (q[v] - p[v]) * (x - p[u])
+            inside &= (side > 0.0) == (normal[axis] > 0.0)
+        row, column = np.nonzero(inside)
+        at_x, at_y = x[column], y[row, 0]
+        depth = normal[u] * (at_x - corners[0, u]) + normal[v] * (at_y - corners[0, v])
+        rays.append(spans[v][row] * cells[u] + spans[u][column])
+        places.append(corners[0, axis] - depth / normal[axis])
+        normals.append(np.broadcast_to(normal / np.linalg.norm(normal), (len(row), 3)))
+    return np.concatenate(rays), np.concatenate(places), np.concatenate(normals)
+
+
+def _empty(box_mm: Floats, cell_mm: float) -> Dexels:
+    low, high = box_mm
+    cells = np.maximum(1, np.ceil((high - low) / cell_mm - 1e-9)).astype(np.int64)
+    rays = int(_firsts(cells)[3])
+    if rays > MAX_RAYS:
+        raise input_error(
+            "stock-large",
+            f"the stock of {' x '.join(f'{size:.0f}' for size in high - low)} mm would be "
+            f"{rays / 1e6:.0f} million rays at {cell_mm:.3g} mm",
+            "state a smaller [stock], or a coarser resolution_mm",
+        )
+    blocks = sum(-(-int(cells[(k + 1) % 3]) // SIDE) * -(-int(cells[(k + 2) % 3]) // SIDE) for k in range(3))
+    return Dexels(
+        ends=np.zeros((rays, 2 * _FEW), np.float32),
+        facing=np.zeros((rays, 2 * _FEW), np.int32),
+        filled=np.zeros(rays, np.int32),
+        bound=np.empty((blocks, 2), np.float32),
+        low_mm=low.copy(),
+        cell_mm=(high - low) / cells,
+        cells=cells,
+    )
+
+
+def _firsts(cells: Ints) -> Ints:
+    """Return the first ray of each field, and the number of all."""
+    return np.concatenate([[0], np.cumsum([cells[(k + 1) % 3] * cells[(k + 2) % 3] for k in range(3)])])
+
+
+def _packed(normals: Floats) -> Ints32:
+    """Return unit vectors (n, 3) as three signed bytes each."""
+    parts = np.rint(normals * _SHORTENED).astype(np.int64) & 0xFF
+    packed: Ints32 = (parts @ np.array([1, 1 << 8, 1 << 16])).astype(np.int32)
+    return packed

@@ -1,0 +1,687 @@
+/* Cut the body of a cutter, in any direction and while it turns, out of three fields of dexels.
+
+What a step sweeps on a ray is the union of what the body covers from its first pose to its last. A convex body that goes
+straight covers [s_in(t), s_out(t)] with s_in convex and s_out concave in t, so the ends of the union are found from the
+slopes at both poses; the turn within a step is so small that this holds for it too. Blocks of rays are left alone where
+a plane parts them from the body at both poses. */
+
+#include "cutting/dexels.h"
+
+#include "collision/shapes.h"
+
+#define NEAR_MM 2e-6       /* a place is on a body */
+#define CLOSE_MM 1e-3      /* a last step of Newton from there ends on it, where the ray is so steep */
+#define STEEP 0.3
+#define THIN_MM 1e-4       /* a stretch that is shorter is none; an end that moves by less stays */
+#define PARTED_MM 1e-5     /* a plane parts where it does so by no less than minus this */
+#define FINE 0.02          /* of a cell: where a swept surface may be beside the true one */
+#define PARALLEL 1e-6      /* cosine between ray and surface below which its slope says nothing of the step */
+#define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
+
+enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10, SHORTENED = 127 };
+
+typedef struct {
+    const Dexels *stock;
+    const Body *body;
+    const Step *step;
+    Field field;
+    Pose first, middle, last;
+    double low[3], high[3]; /* how far it reaches */
+    double fine_mm;         /* where a surface may be beside the swept one */
+} Cut;
+
+/* Where a ray enters and leaves a body: the place on it, and how that moves with the step. */
+typedef struct {
+    bool hits;
+    double at[2], slope[2], normal[2][3];
+} Hit;
+
+Field field_of(const Dexels *stock, int axis) {
+    Field field = {.axis = axis};
+    for (int before = 0; before <= axis; before++) {
+        field.u = (before + 1) % 3;
+        field.v = (before + 2) % 3;
+        field.first += field.columns * field.rows;
+        field.first_block += field.block_columns * ((field.rows + SIDE - 1) / SIDE);
+        field.columns = AT(stock->cells, field.u);
+        field.rows = AT(stock->cells, field.v);
+        field.block_columns = (field.columns + SIDE - 1) / SIDE;
+    }
+    return field;
+}
+
+Pose pose_at(const Step *step, double share) {
+    Pose pose;
+    double square = 0.0;
+    for (int k = 0; k < 3; k++) {
+        pose.tip[k] = step->from.tip[k] + share * step->way[k];
+        pose.axis[k] = step->from.axis[k] + share * step->turn[k];
+        square += squared(pose.axis[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        pose.axis[k] /= sqrt(square);
+    return pose;
+}
+
+double outside_of(const Body *body, double radius, double height, double away[2]) {
+    const double x = radius - body->bottom, y = height - body->corner;
+    const double side = x * body->sin_kappa - y * body->cos_kappa - body->corner, under = -height;
+    double most = under;
+    away[0] = 0.0;
+    away[1] = -1.0;
+    if (x > 0.0 && x * body->cos_kappa + y * body->sin_kappa < 0.0) {
+        const double distance = sqrt(x * x + y * y);
+        most = distance - body->corner;
+        away[0] = x / distance;
+        away[1] = y / distance;
+    } else if (side > under) {
+        most = side;
+        away[0] = body->sin_kappa;
+        away[1] = -body->cos_kappa;
+    }
+    if (radius - body->radius > most) {
+        most = radius - body->radius;
+        away[0] = 1.0;
+        away[1] = 0.0;
+    }
+    if (height - body->top > most) {
+        most = height - body->top;
+        away[0] = 0.0;
+        away[1] = 1.0;
+    }
+    return most;
+}
+
+double outside_at(const Body *body, const Pose *pose, const double *place) {
+    double off[3], away[2];
+    minus3(place, pose->tip, off);
+    const double height = dot3(off, pose->axis), square = dot3(off, off) - height * height;
+    return outside_of(body, sqrt(greater(square, 0.0)), height, away);
+}
+
+double reach_of(const Body *body, const Pose *pose, const double *along) {
+    const double up = dot3(along, pose->axis), aside = sqrt(greater(1.0 - up * up, 0.0));
+    double reach = body->bottom * aside + body->corner * (up + 1.0);
+    if (body->cos_kappa > GRAZES) {
+        const double rise = (body->radius - body->bottom) * body->sin_kappa - body->corner;
+        reach = greater(reach, body->radius * aside + (body->corner + rise / body->cos_kappa) * up);
+    }
+    return dot3(along, pose->tip) + greater(reach, body->radius * aside + body->top * up);
+}
+
+/* A ray seen from a body: along it, height = height + s·climb and radius² = a·s² + 2·b·s + c, s counted from the tip. */
+typedef struct {
+    double off[3], height, climb, a, b, c;
+} Seen;
+
+/* Move a place on a ray towards the body, from outside of it, until it is on its surface; returns false where it is
+   passed by. How far outside is convex along the ray, so that Newton's steps never go too far. */
+static bool approach(const Body *body, const Seen *seen, double sense, double limit, double *at, double away[2]) {
+    for (int round = 0; round < MOST_NEWTON; round++) {
+        const double s = *at, height = seen->height + s * seen->climb;
+        const double radius = sqrt(greater((seen->a * s + 2.0 * seen->b) * s + seen->c, 1e-18));
+        const double outside = outside_of(body, radius, height, away);
+        if (outside <= NEAR_MM)
+            return true;
+        const double slope = away[0] * (seen->a * s + seen->b) / radius + away[1] * seen->climb;
+        if (slope * sense >= -GRAZES)
+            return false;
+        *at = s - outside / slope;
+        if ((*at - limit) * sense > 0.0)
+            return false;
+        if (outside < CLOSE_MM && fabs(slope) > STEEP)
+            return true;
+    }
+    return true;
+}
+
+/* Move the ends of a ray that lie below the rim of a ball onto it; returns false where it is passed by. */
+static bool begin_on_ball(const Body *body, const Seen *seen, double *ends) {
+    const double up = body->corner - seen->height; /* the middle, from the place at s = 0 */
+    const double rim = body->corner * (1.0 - body->cos_kappa);
+    const double along = body->corner * seen->climb;
+    const double root = along * along - seen->c - up * up + squared(body->corner);
+    for (int end = 0; end < 2; end++) {
+        if (seen->height + ends[end] * seen->climb >= rim)
+            continue;
+        if (root <= 0.0)
+            return false;
+        const double at = along + (end == 0 ? -sqrt(root) : sqrt(root));
+        if (seen->height + at * seen->climb < rim)
+            ends[end] = at;
+    }
+    return ends[0] < ends[1];
+}
+
+/* Move the ends of a ray to the cone that the side of a body lies on; returns false where it is passed by. */
+static bool begin_on_cone(const Body *body, const Seen *seen, double *ends) {
+    const double widens = body->cos_kappa / body->sin_kappa;
+    const double at_tip = body->bottom + body->corner * (1.0 / body->sin_kappa - widens);
+    const double first = at_tip + widens * seen->height, change = widens * seen->climb;
+    const double a = seen->a - change * change, b = seen->b - first * change, c = seen->c - first * first;
+    const double root = b * b - a * c;
+    if (fabs(a) < 1e-9)
+        return true; /* along the side */
+    if (root <= 0.0)
+        return a < 0.0;
+    const double low = (-b - sqrt(root)) / a, high = (-b + sqrt(root)) / a;
+    if (a > 0.0) {
+        ends[0] = greater(ends[0], low);
+        ends[1] = lesser(ends[1], high);
+        return ends[0] < ends[1] && first + low * change > 0.0;
+    }
+    /* steeper than the side: it is passed once on each half of the cone */
+    if (change > 0.0)
+        ends[0] = greater(ends[0], greater(low, high));
+    else
+        ends[1] = lesser(ends[1], lesser(low, high));
+    return ends[0] < ends[1];
+}
+
+/* Narrow [low, high] to where a quantity that changes evenly, first at s = 0, is between 0 and a limit. */
+static bool narrow(double first, double change, double limit, double *low, double *high) {
+    if (fabs(change) < 1e-12)
+        return first >= -NEAR_MM && first <= limit;
+    const double a = -first / change, b = (limit - first) / change;
+    *low = greater(*low, lesser(a, b));
+    *high = lesser(*high, greater(a, b));
+    return *low < *high;
+}
+
+/* Hold a ray, through `place` across its axis, against the body at a share of the step. */
+static Hit hold(const Cut *cut, const double *place, double share) {
+    const Body *body = cut->body;
+    const int axis = cut->field.axis, u = cut->field.u, v = cut->field.v;
+    const Pose pose = share == 0.0 ? cut->first : share == 1.0 ? cut->last : pose_at(cut->step, share);
+    Hit hit = {.hits = false};
+    Seen seen;
+    seen.off[axis] = 0.0;
+    seen.off[u] = place[u] - pose.tip[u];
+    seen.off[v] = place[v] - pose.tip[v];
+    const double square = squared(seen.off[u]) + squared(seen.off[v]);
+    seen.climb = pose.axis[axis];
+    seen.height = seen.off[u] * pose.axis[u] + seen.off[v] * pose.axis[v];
+    seen.a = 1.0 - squared(seen.climb);
+    seen.b = -seen.height * seen.climb;
+    seen.c = square - squared(seen.height);
+    double ends[2] = {-INFINITY, INFINITY};
+    if (!narrow(seen.height, seen.climb, body->top, &ends[0], &ends[1]))
+        return hit;
+    const double over = seen.c - squared(body->radius);
+    if (seen.a > 1e-12) {
+        const double root = seen.b * seen.b - seen.a * over;
+        if (root <= 0.0)
+            return hit;
+        ends[0] = greater(ends[0], (-seen.b - sqrt(root)) / seen.a);
+        ends[1] = lesser(ends[1], (-seen.b + sqrt(root)) / seen.a);
+    } else if (over >= 0.0) {
+        return hit;
+    }
+    if (!(ends[0] < ends[1]))
+        return hit;
+    double away[2][2];
+    if (body->cos_kappa > 0.0 && !begin_on_cone(body, &seen, ends))
+        return hit;
+    if (body->bottom == 0.0 && body->corner > 0.0 && !begin_on_ball(body, &seen, ends))
+        return hit;
+    if (!approach(body, &seen, 1.0, ends[1], &ends[0], away[0]) ||
+        !approach(body, &seen, -1.0, ends[0], &ends[1], away[1]))
+        return hit;
+    hit.hits = true;
+    for (int end = 0; end < 2; end++) {
+        double *normal = hit.normal[end], move = 0.0;
+        seen.off[axis] = ends[end];
+        const double height = seen.height + ends[end] * seen.climb;
+        const double radius = sqrt(greater((seen.a * ends[end] + 2.0 * seen.b) * ends[end] + seen.c, 1e-18));
+        const double turns = dot3(cut->step->turn, seen.off);
+        for (int k = 0; k < 3; k++) {
+            normal[k] = away[end][0] * (seen.off[k] - height * pose.axis[k]) / radius + away[end][1] * pose.axis[k];
+            move += normal[k] * (cut->step->way[k] + cut->step->turn[k] * height - pose.axis[k] * turns);
+        }
+        hit.at[end] = pose.tip[axis] + ends[end];
+        hit.slope[end] = fabs(normal[axis]) < GRAZES ? 0.0 : move / normal[axis];
+    }
+    return hit;
+}
+
+/* Write the normal of the surface that a step leaves between two poses: that of the two normals there which is across the
+   way. A sharp edge leaves a surface that is neither of its own sides. */
+static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double *normal) {
+    const int axis = cut->field.axis;
+    const double *a = from->normal[end], *b = to->normal[end];
+    const double of_b = fabs(from->slope[end] * a[axis]), of_a = fabs(to->slope[end] * b[axis]);
+    if (!(of_a + of_b > 0.0) || (from->slope[end] > 0.0) == (to->slope[end] > 0.0))
+        return;
+    double square = 0.0;
+    for (int k = 0; k < 3; k++) {
+        normal[k] = of_a * a[k] + of_b * b[k];
+        square += squared(normal[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] /= sqrt(square);
+}
+
+/* Tell whether a ray has material between two places on it, in either order. */
+static bool has_between(const Cut *cut, int64_t ray, double a, double b) {
+    const double low = lesser(a, b) - cut->fine_mm, high = greater(a, b) + cut->fine_mm;
+    for (int64_t k = 0; k < AT(cut->stock->filled, ray); k++)
+        if (CELL(cut->stock->ends, ray, 2 * k) < high && CELL(cut->stock->ends, ray, 2 * k + 1) > low)
+            return true;
+    return false;
+}
+
+/* Tell whether a ray has material as far as the step may reach on it, by the tangents at one pose, `ahead` of which (1, -1)
+   the step lies: what is covered begins no earlier and ends no later than they say. */
+static bool is_in_reach(const Cut *cut, int64_t ray, const Hit *hit, double ahead) {
+    const int axis = cut->field.axis;
+    if (fabs(hit->normal[0][axis]) < PARALLEL || fabs(hit->normal[1][axis]) < PARALLEL)
+        return true;
+    return has_between(cut, ray, hit->at[0] + lesser(ahead * hit->slope[0], 0.0),
+                       hit->at[1] + greater(ahead * hit->slope[1], 0.0));
+}
+
+/* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
+   whose slopes say that it lies between them. A pose that misses has none. */
+static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, Hit from, double b, Hit to, Hit *best) {
+    const double sense = end == 0 ? 1.0 : -1.0;
+    bool is_between = false;
+    for (int round = 0; round < MOST_HALVINGS; round++) {
+        if ((from.hits && from.slope[end] * sense >= 0.0) || (to.hits && to.slope[end] * sense <= 0.0))
+            break;
+        double share = 0.5 * (a + b);
+        if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola; none is beyond */
+            const double meet = to.at[end] - from.at[end] - to.slope[end] * (b - a);
+            const double after = clamped(meet / (from.slope[end] - to.slope[end]), 0.02 * (b - a), 0.98 * (b - a));
+            const double bound = from.at[end] + from.slope[end] * after;
+            if ((best->at[end] - bound) * sense < cut->fine_mm || !has_between(cut, ray, bound, best->at[end]))
+                break;
+            share = a + after;
+        }
+        const Hit here = hold(cut, place, share);
+        if (!here.hits && !from.hits && !to.hits)
+            return;
+        is_between = is_between || here.hits;
+        if (here.hits && (!best->hits || (here.at[end] - best->at[end]) * sense < 0.0)) {
+            best->at[end] = here.at[end];
+            copy3(here.normal[end], best->normal[end]);
+        }
+        const bool is_before = here.hits ? here.slope[end] * sense < 0.0 : !from.hits;
+        if (is_before) {
+            a = share;
+            from = here;
+        } else {
+            b = share;
+            to = here;
+        }
+    }
+    if (is_between && from.hits && to.hits)
+        face(cut, end, &from, &to, best->normal[end]);
+}
+
+/* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray. */
+static double nearest_share(const Cut *cut, const double *place) {
+    const int u = cut->field.u, v = cut->field.v;
+    const Pose *middle = &cut->middle;
+    const double low = cut->body->corner, high = cut->body->top;
+    const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
+    const double off_u = place[u] - middle->tip[u], off_v = place[v] - middle->tip[v];
+    const double across = way_u * middle->axis[v] - way_v * middle->axis[u];
+    double share = 0.0, up = low, square = way_u * way_u + way_v * way_v;
+    if (fabs(across) > 1e-6)
+        up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
+    if (square > 1e-12)
+        share = ((off_u - up * middle->axis[u]) * way_u + (off_v - up * middle->axis[v]) * way_v) / square;
+    return clamped(0.5 + share, 0.0, 1.0);
+}
+
+/* Return what the whole step covers on a ray. */
+static Hit swept(const Cut *cut, int64_t ray, const double *place) {
+    const Hit from = hold(cut, place, 0.0);
+    if (cut->step->follows && from.hits && from.slope[0] >= 0.0 && from.slope[1] <= 0.0)
+        return (Hit){.hits = false}; /* it only leaves the ray: what it covers is cut */
+    if (from.hits && !is_in_reach(cut, ray, &from, 1.0))
+        return (Hit){.hits = false};
+    const Hit to = hold(cut, place, 1.0);
+    if (to.hits && !is_in_reach(cut, ray, &to, -1.0))
+        return (Hit){.hits = false};
+    Hit best = from.hits ? from : to;
+    if (!best.hits) {
+        const double share = nearest_share(cut, place);
+        const Hit here = best = hold(cut, place, share);
+        for (int end = 0; end < 2 && here.hits; end++) {
+            widen(cut, ray, place, end, 0.0, from, share, here, &best);
+            widen(cut, ray, place, end, share, here, 1.0, to, &best);
+        }
+        return best;
+    }
+    for (int end = 0; end < 2; end++) {
+        const double sense = end == 0 ? 1.0 : -1.0;
+        if (from.hits && to.hits && (to.at[end] - from.at[end]) * sense < 0.0) {
+            best.at[end] = to.at[end];
+            copy3(to.normal[end], best.normal[end]);
+        }
+        widen(cut, ray, place, end, 0.0, from, 1.0, to, &best);
+    }
+    return best;
+}
+
+static int32_t packed(const double *normal) {
+    uint32_t bits = 0;
+    for (int k = 0; k < 3; k++)
+        bits |= (uint32_t)((int32_t)lrint(-normal[k] * SHORTENED) & 0xff) << (8 * k);
+    return (int32_t)bits;
+}
+
+static inline double unpacked(int32_t bits, int k) { return (double)(int8_t)((uint32_t)bits >> (8 * k)) / SHORTENED; }
+
+/* Take what is covered out of a ray; return false where it has no room. */
+static bool take(const Dexels *stock, int64_t ray, const Hit *hit, double *longest) {
+    const int64_t most_ends = stock->ends.columns;
+    const float low = (float)hit->at[0], high = (float)hit->at[1];
+    const int64_t count = AT(stock->filled, ray);
+    int64_t left = 0;
+    float ends[2 * TD_MOST + 2];
+    int32_t facing[2 * TD_MOST + 2];
+    for (int64_t k = 0; k < count; k++) {
+        const float a = CELL(stock->ends, ray, 2 * k), b = CELL(stock->ends, ray, 2 * k + 1);
+        const int32_t at_a = CELL(stock->facing, ray, 2 * k), at_b = CELL(stock->facing, ray, 2 * k + 1);
+        const bool is_before = low - a > (float)THIN_MM, is_behind = b - high > (float)THIN_MM;
+        const float cut = (b < high ? b : high) - (a > low ? a : low);
+        if (!(cut > (float)THIN_MM)) {
+            ends[2 * left] = a;
+            ends[2 * left + 1] = b;
+            facing[2 * left] = at_a;
+            facing[2 * left++ + 1] = at_b;
+            continue;
+        }
+        *longest = greater(*longest, cut);
+        if (is_before) {
+            ends[2 * left] = a;
+            ends[2 * left + 1] = low;
+            facing[2 * left] = at_a;
+            facing[2 * left++ + 1] = packed(hit->normal[0]);
+        }
+        if (is_behind) {
+            ends[2 * left] = high;
+            ends[2 * left + 1] = b;
+            facing[2 * left] = packed(hit->normal[1]);
+            facing[2 * left++ + 1] = at_b;
+        }
+    }
+    if (2 * left > most_ends)
+        return false;
+    for (int64_t k = 0; k < 2 * left; k++) {
+        CELL(stock->ends, ray, k) = ends[k];
+        CELL(stock->facing, ray, k) = facing[k];
+    }
+    AT(stock->filled, ray) = (int32_t)left;
+    return true;
+}
+
+/* Tell whether a plane parts a box from the body at both poses: across the way from its axis to the box. */
+static bool is_parted(const Cut *cut, const double *low, const double *high) {
+    const Body *body = cut->body;
+    const Pose *middle = &cut->middle;
+    double on_axis[3], near[3], off[3], away[2];
+    for (int k = 0; k < 3; k++)
+        near[k] = 0.5 * (low[k] + high[k]);
+    for (int round = 0; round < 3; round++) {
+        minus3(near, middle->tip, off);
+        const double up = clamped(dot3(off, middle->axis), lesser(body->corner + body->radius, 0.5 * body->top), body->top);
+        for (int k = 0; k < 3; k++) {
+            on_axis[k] = middle->tip[k] + up * middle->axis[k];
+            near[k] = clamped(on_axis[k], low[k], high[k]);
+        }
+    }
+    minus3(near, middle->tip, off);
+    const double height = dot3(off, middle->axis), radius = sqrt(greater(dot3(off, off) - height * height, 1e-18));
+    outside_of(body, radius, height, away);
+    double normal[3], nearest = 0.0;
+    for (int k = 0; k < 3; k++) {
+        normal[k] = away[0] * (off[k] - height * middle->axis[k]) / radius + away[1] * middle->axis[k];
+        nearest += normal[k] * (normal[k] > 0.0 ? low[k] : high[k]);
+    }
+    return nearest >= greater(reach_of(body, &cut->first, normal), reach_of(body, &cut->last, normal)) - PARTED_MM;
+}
+
+/* A range of cells along an axis: those whose middle lies between two coordinates. */
+static void cells_in(const Dexels *stock, int axis, double low, double high, int64_t *first, int64_t *after) {
+    const double origin = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis);
+    *first = most((int64_t)ceil((low - origin) / size - 0.5), 0);
+    *after = least((int64_t)floor((high - origin) / size - 0.5) + 1, AT(stock->cells, axis));
+}
+
+static double middle_of(const Dexels *stock, int axis, int64_t cell) {
+    return AT(stock->low_mm, axis) + ((double)cell + 0.5) * AT(stock->cell_mm, axis);
+}
+
+/* Compute the bound of a block again: lowest and highest end. */
+static void bound_block(const Dexels *stock, const Field *field, int64_t row, int64_t column) {
+    float low = INFINITY, high = -INFINITY;
+    for (int64_t i = row * SIDE; i < least((row + 1) * SIDE, field->rows); i++)
+        for (int64_t j = column * SIDE; j < least((column + 1) * SIDE, field->columns); j++) {
+            const int64_t ray = field->first + i * field->columns + j, count = AT(stock->filled, ray);
+            if (count == 0)
+                continue;
+            const float first = CELL(stock->ends, ray, 0), last = CELL(stock->ends, ray, 2 * count - 1);
+            low = first < low ? first : low;
+            high = last > high ? last : high;
+        }
+    const int64_t block = field->first_block + row * field->block_columns + column;
+    CELL(stock->bound, block, 0) = low;
+    CELL(stock->bound, block, 1) = high;
+}
+
+/* Return whether a ray has material where the body reaches; widen the bounds of it. */
+static bool is_reached(const Cut *cut, int64_t ray, double *low, double *high) {
+    const int axis = cut->field.axis;
+    bool is = false;
+    for (int64_t k = 0; k < AT(cut->stock->filled, ray); k++) {
+        const double a = greater(CELL(cut->stock->ends, ray, 2 * k), cut->low[axis]);
+        const double b = lesser(CELL(cut->stock->ends, ray, 2 * k + 1), cut->high[axis]);
+        if (b - a > THIN_MM) {
+            *low = lesser(*low, a);
+            *high = greater(*high, b);
+            is = true;
+        }
+    }
+    return is;
+}
+
+/* Cut the rays of a block within ranges of cells; return false where one has no room. */
+static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t *u, const int64_t *v, double *longest) {
+    const Dexels *stock = cut->stock;
+    const Field *field = &cut->field;
+    const int64_t block = field->first_block + row * field->block_columns + column;
+    const int64_t i0 = most(row * SIDE, v[0]), i1 = least((row + 1) * SIDE, v[1]);
+    const int64_t j0 = most(column * SIDE, u[0]), j1 = least((column + 1) * SIDE, u[1]);
+    if (CELL(stock->bound, block, 0) >= cut->high[field->axis] || CELL(stock->bound, block, 1) <= cut->low[field->axis])
+        return true;
+    double low[3], high[3], place[3] = {0.0, 0.0, 0.0};
+    bool is_in[SIDE * SIDE], has_room = true;
+    low[field->axis] = INFINITY;
+    high[field->axis] = -INFINITY;
+    for (int64_t i = i0, at = 0; i < i1; i++)
+        for (int64_t j = j0; j < j1; j++)
+            is_in[at++] = is_reached(cut, field->first + i * field->columns + j, &low[field->axis], &high[field->axis]);
+    low[field->u] = middle_of(stock, field->u, j0);
+    high[field->u] = middle_of(stock, field->u, j1 - 1);
+    low[field->v] = middle_of(stock, field->v, i0);
+    high[field->v] = middle_of(stock, field->v, i1 - 1);
+    if (!(low[field->axis] < high[field->axis]) || is_parted(cut, low, high))
+        return true;
+    for (int64_t i = i0, at = 0; i < i1; i++)
+        for (int64_t j = j0; j < j1 && has_room; j++) {
+            if (!is_in[at++])
+                continue;
+            place[field->u] = middle_of(stock, field->u, j);
+            place[field->v] = middle_of(stock, field->v, i);
+            const int64_t ray = field->first + i * field->columns + j;
+            const Hit hit = swept(cut, ray, place);
+            if (hit.hits)
+                has_room = take(stock, ray, &hit, longest);
+        }
+    bound_block(stock, field, row, column);
+    return has_room;
+}
+
+/* Take a step out of the stock: see dexels.h. */
+bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm) {
+    Cut cut = {.stock = stock, .body = body, .step = step, .fine_mm = FINE * AT(stock->cell_mm, 0)};
+    cut.first = pose_at(step, 0.0);
+    cut.middle = pose_at(step, 0.5);
+    cut.last = pose_at(step, 1.0);
+    int64_t cells[3][2];
+    for (int axis = 0; axis < 3; axis++) {
+        double along[3] = {0.0, 0.0, 0.0};
+        along[axis] = 1.0;
+        cut.high[axis] = greater(reach_of(body, &cut.first, along), reach_of(body, &cut.last, along));
+        along[axis] = -1.0;
+        cut.low[axis] = -greater(reach_of(body, &cut.first, along), reach_of(body, &cut.last, along));
+        cells_in(stock, axis, cut.low[axis], cut.high[axis], &cells[axis][0], &cells[axis][1]);
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        cut.field = field_of(stock, axis);
+        const int64_t *u = cells[cut.field.u], *v = cells[cut.field.v];
+        if (u[0] >= u[1] || v[0] >= v[1])
+            continue;
+        for (int64_t row = v[0] / SIDE; row <= (v[1] - 1) / SIDE; row++)
+            for (int64_t column = u[0] / SIDE; column <= (u[1] - 1) / SIDE; column++)
+                if (!cut_block(&cut, row, column, u, v, &removed_mm[axis]))
+                    return false;
+    }
+    return true;
+}
+
+/* The cell of a coordinate, the nearest one where it lies outside. */
+static int64_t cell_of(const Dexels *stock, int axis, double at) {
+    const double cell = floor((at - AT(stock->low_mm, axis)) / AT(stock->cell_mm, axis));
+    return (int64_t)clamped(cell, 0.0, (double)(AT(stock->cells, axis) - 1));
+}
+
+double depth_at(const Dexels *stock, const double *place, double near_mm) {
+    double best = 0.0, nearest_square = INFINITY, beyond = -INFINITY; /* of the box */
+    int inside = 0;
+    int64_t cell[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const double low = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis) * (double)AT(stock->cells, axis);
+        beyond = greater(beyond, greater(low - place[axis], place[axis] - low - size));
+        if (beyond > near_mm)
+            return -near_mm;
+        cell[axis] = cell_of(stock, axis, place[axis]);
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        const Field field = field_of(stock, axis);
+        const int64_t ray = field.first + cell[field.v] * field.columns + cell[field.u], count = AT(stock->filled, ray);
+        int64_t after = 0; /* the first end behind the place */
+        while (after < 2 * count && CELL(stock->ends, ray, after) <= (float)place[axis])
+            after++;
+        inside += after % 2;
+        double own = 0.0, own_square = INFINITY;
+        for (int64_t end = after - 1; end <= after; end++) {
+            if (end < 0 || end >= 2 * count)
+                continue;
+            double off[3], depth = 0.0;
+            off[axis] = place[axis] - CELL(stock->ends, ray, end);
+            const int32_t facing = CELL(stock->facing, ray, end);
+            const double steep = fabs(unpacked(facing, axis));
+            if (fabs(off[axis]) * steep > 1.5 * near_mm)
+                continue;
+            off[field.u] = place[field.u] - middle_of(stock, field.u, cell[field.u]);
+            off[field.v] = place[field.v] - middle_of(stock, field.v, cell[field.v]);
+            for (int k = 0; k < 3; k++)
+                depth -= unpacked(facing, k) * off[k];
+            if (fabs(depth) > near_mm)
+                continue;
+            /* of a thin layer both sides count, of a thin gap either */
+            own = own_square == INFINITY ? depth : after % 2 ? lesser(own, depth) : greater(own, depth);
+            own_square = lesser(own_square, dot3(off, off));
+        }
+        /* beside an edge the plane of the farther side goes on where there is no surface of it */
+        if (own_square < nearest_square) {
+            nearest_square = own_square;
+            best = own;
+        }
+    }
+    if (nearest_square == INFINITY)
+        best = inside >= 2 ? near_mm : -near_mm;
+    return beyond > 0.0 ? lesser(best, -beyond) : best;
+}
+
+double highest_near(const Dexels *stock, double x, double y, double radius) {
+    const Field field = field_of(stock, 2);
+    int64_t u[2], v[2];
+    const double wide_x = radius + AT(stock->cell_mm, 0), wide_y = radius + AT(stock->cell_mm, 1);
+    cells_in(stock, 0, x - wide_x, x + wide_x, &u[0], &u[1]);
+    cells_in(stock, 1, y - wide_y, y + wide_y, &v[0], &v[1]);
+    float top = -INFINITY;
+    if (u[0] >= u[1] || v[0] >= v[1])
+        return top;
+    for (int64_t row = v[0] / SIDE; row <= (v[1] - 1) / SIDE; row++)
+        for (int64_t column = u[0] / SIDE; column <= (u[1] - 1) / SIDE; column++) {
+            const float high = CELL(stock->bound, field.first_block + row * field.block_columns + column, 1);
+            top = high > top ? high : top;
+        }
+    return top;
+}
+
+/* Compute the bounds of all blocks. */
+EXPORT void cutting_bound_dexels(const Dexels *stock) {
+    for (int axis = 0; axis < 3; axis++) {
+        const Field field = field_of(stock, axis);
+        for (int64_t row = 0; row * SIDE < field.rows; row++)
+            for (int64_t column = 0; column * SIDE < field.columns; column++)
+                bound_block(stock, &field, row, column);
+    }
+}
+
+/* Return the volume of the material: of each cell the share below the surface next to its middle. */
+EXPORT double cutting_dexel_volume(const Dexels *stock) {
+    const double size = lesser(AT(stock->cell_mm, 0), lesser(AT(stock->cell_mm, 1), AT(stock->cell_mm, 2)));
+    const double cell = AT(stock->cell_mm, 0) * AT(stock->cell_mm, 1) * AT(stock->cell_mm, 2);
+    double cells = 0.0;
+    for (int64_t k = 0; k < AT(stock->cells, 2); k++)
+        for (int64_t j = 0; j < AT(stock->cells, 1); j++)
+            for (int64_t i = 0; i < AT(stock->cells, 0); i++) {
+                const double middle[3] = {middle_of(stock, 0, i), middle_of(stock, 1, j), middle_of(stock, 2, k)};
+                cells += clamped(0.5 + depth_at(stock, middle, 2.0 * size) / size, 0.0, 1.0);
+            }
+    return cells * cell;
+}
+
+/* Write how deep capsules (n, 6), radii (n), are in the material at most, 0 where they are not, and where. */
+EXPORT void cutting_bodies_dexels(const Dexels *stock, Floats ends_mm, Floats radius_mm, Floats depth_mm, Floats place_mm) {
+    const Field field = field_of(stock, 2);
+    for (int64_t n = 0; n < ends_mm.rows; n++) {
+        const double *a = &CELL(ends_mm, n, 0), *b = a + 3, wide = AT(radius_mm, n);
+        int64_t u[2], v[2];
+        cells_in(stock, 0, lesser(a[0], b[0]) - wide, greater(a[0], b[0]) + wide, &u[0], &u[1]);
+        cells_in(stock, 1, lesser(a[1], b[1]) - wide, greater(a[1], b[1]) + wide, &v[0], &v[1]);
+        AT(depth_mm, n) = 0.0;
+        for (int k = 0; k < 3; k++)
+            CELL(place_mm, n, k) = NAN;
+        for (int64_t i = v[0]; i < v[1]; i++)
+            for (int64_t j = u[0]; j < u[1]; j++) {
+                const int64_t ray = i * field.columns + j + field.first;
+                const double x = middle_of(stock, 0, j), y = middle_of(stock, 1, i);
+                for (int64_t k = 0; k < AT(stock->filled, ray); k++) {
+                    const double low = CELL(stock->ends, ray, 2 * k), high = CELL(stock->ends, ray, 2 * k + 1);
+                    if (high <= lesser(a[2], b[2]) - wide || low >= greater(a[2], b[2]) + wide)
+                        continue;
+                    const double stretch[6] = {x, y, low, x, y, high};
+                    double place[3];
+                    const double depth = wide - sqrt(segment_segment(a, stretch, place));
+                    if (depth > AT(depth_mm, n)) {
+                        AT(depth_mm, n) = depth;
+                        copy3(place, &CELL(place_mm, n, 0));
+                    }
+                }
+            }
+    }
+}
+
+/* Write how deep places (n, 3) are in material, to `near_mm`. */
+EXPORT void cutting_depths(const Dexels *stock, Floats places_mm, double near_mm, Floats depth_mm) {
+    for (int64_t i = 0; i < places_mm.rows; i++)
+        AT(depth_mm, i) = depth_at(stock, &CELL(places_mm, i, 0), near_mm);
+}

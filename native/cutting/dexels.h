@@ -1,0 +1,62 @@
+/* Material as three fields of dexels, and the body of a cutter in any direction.
+
+A dexel is a ray along an axis of `$BASE` through the middle of a cell, with the stretches of it that are material. Each
+end of a stretch bears the normal of the surface there, so that a surface is known between the rays too: to the second
+order in a cell, not the first. Dexels and Turned are declared in gcode2krl/cutting/dexels.py and turned.py. */
+
+#ifndef CUTTING_DEXELS_H
+#define CUTTING_DEXELS_H
+
+#include "collision/vectors.h"
+#include "constants.h"
+#include "core.h"
+
+/* A row of Turned.bodies: a flat bottom, a corner arc, a side at an angle kappa up to a radius, a cylinder up to the
+   top. It is convex. Lengths in mm, heights from the tip. */
+typedef struct {
+    double bottom, corner, sin_kappa, cos_kappa, radius, top;
+} Body;
+
+typedef struct {
+    double tip[3], axis[3];
+} Pose;
+
+/* A motion of a body from a pose: the tip goes straight, the axis turns evenly. It `follows` where what the body covers in
+   that pose has been cut. */
+typedef struct {
+    Pose from;
+    double way[3], turn[3];
+    bool follows;
+} Step;
+
+/* Rays along an axis, columns along `u`, rows along `v`; the first of them and of their blocks. */
+typedef struct {
+    int axis, u, v;
+    int64_t columns, rows, first, block_columns, first_block;
+} Field;
+
+Field field_of(const Dexels *stock, int axis);
+
+/* Return the pose at a share of a step. */
+Pose pose_at(const Step *step, double share);
+
+/* Return how far a point at a radius and a height is outside a body, negative inside; write the direction away. */
+double outside_of(const Body *body, double radius, double height, double away[2]);
+
+/* Return how far a place is outside a body in a pose. */
+double outside_at(const Body *body, const Pose *pose, const double *place);
+
+/* Return how far a body in a pose reaches along a unit vector. */
+double reach_of(const Body *body, const Pose *pose, const double *along);
+
+/* Take a step of a body out of the stock; raise `removed_mm` (3) to the longest stretch taken from a ray of each field. Returns
+   false where a ray has no room for another stretch: the step is then to be done again. */
+bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm);
+
+/* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side. */
+double depth_at(const Dexels *stock, const double *place, double near_mm);
+
+/* Return a height that no material within a radius in plan is above. */
+double highest_near(const Dexels *stock, double x, double y, double radius);
+
+#endif
