@@ -28,6 +28,7 @@ def found(issues, code, words):
     return [issue for issue in issues if issue[1] == code and words in issue[3]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("code", "state", "case"), CASES, ids=[code for code, _, _ in CASES])
 def test_who_follows_a_remedy_is_rid_of_the_finding(code, state, case):
     wrong = laid(state, case.wrong)
