@@ -64,22 +64,6 @@ def reading(path, dialect, search):
     return "not", None, why
 
 
-def places(toolpath):
-    """Return the programmed places of a reading: of an arc the end alone, of what is not known None."""
-    arc, at, known = toolpath.arc, toolpath.position_mm, toolpath.known
-    rows = [
-        k
-        for k in range(1, len(arc))
-        if not toolpath.machine[k]
-        and (arc[k] < 0 or k + 1 == len(arc) or arc[k + 1] != arc[k])
-        and (arc[k] >= 0 or (at[k] != at[k - 1]).any() or (known[k] != known[k - 1]).any() or known[k].all())
-    ]
-    return [
-        tuple(float(p) if is_known else None for p, is_known in zip(at[k], toolpath.known[k], strict=True))
-        for k in rows
-    ]
-
-
 def text_of(path):
     """Return the text of a file."""
     return path.read_text(encoding="utf-8", errors="replace")
@@ -99,7 +83,7 @@ def compared(path, dialect, toolpath, search):
         return f"not compared ({str(unknown)[:40]})"
     except (KeyError, IndexError, TypeError, ValueError, contour.OffPathError) as error:
         return f"not compared ({type(error).__name__})"
-    found = controls.difference(controls.columns(places(toolpath)), controls.columns(theirs))
+    found = controls.difference(controls.columns(controls.places_of(toolpath)), controls.columns(theirs))
     return "same" if found is None else f"DIFFERS at {found}"
 
 

@@ -18,13 +18,13 @@ from collections import Counter
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from benchmarks.controls_twice import places
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.origin import control_of
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
 from tests.cells import over_demonstration
 from tests.reference import controls
+from tests.reference.controls import places_of
 
 MOST, MOST_BYTES, NO_PROGRAMS = 10, 400_000, (".toml", ".py", ".json", ".md", ".tbl")
 _TOOL = {"diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0}
@@ -140,7 +140,7 @@ def carried_out(path, dialect, counts):
         except (controls.Unknown, KeyError, IndexError, TypeError, ValueError):
             return
         counts["compared with the other reading"] += 1
-        found = controls.difference(controls.columns(places(attempt.read())), theirs)
+        found = controls.difference(controls.columns(places_of(attempt.read())), theirs)
         if found is not None:
             yield f"{path.name}: read, with another meaning: {found}"
 

@@ -7,7 +7,6 @@ from tests.conftest import ROOT
 
 SCRIPT = ROOT / ".ci" / "run"
 IN_TESTS = {
-    "benchmarks/controls_twice.py": "tests/gcode/test_against_reference.py",
     "benchmarks/five_axis.py": "tests/cutting/test_turned.py",
     "benchmarks/gap_calibrate.py": "tests/benchmarks/test_gap_calibrate.py",
     "benchmarks/gap_metamorphic.py": "tests/benchmarks/test_gap_metamorphic.py",

@@ -179,10 +179,19 @@ CASES = {
     ),
     "axis-changes": case(
         {
-            "words": "translate part.nc --cell cell.toml --pilot none -o out.src",
+            "words": "predict part.nc --cell cell.toml --part left.stl -o prediction",
             "cell.toml": FIVE | {"material": {"model": "AW-2017A"}},
             "cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 A20 X21\nG0 Z80",
         },
+        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
+    ),
+    "axis-turns": case(
+        {
+            "words": "translate part.nc --cell cell.toml --pilot index -o out.src",
+            "cell.toml": FIVE | {"material": {"model": "AW-2017A"}},
+            "cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 A20 X21\nG0 Z80",
+        },
+        {"words": "translate part.nc --cell cell.toml --pilot none -o out.src"},
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
     ),
     # zero points
