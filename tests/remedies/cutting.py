@@ -404,14 +404,6 @@ CASES = {
         },
         {"cut": "G1 X-20 F3000\nZ-1\nX100 F600"},
     ),
-    "compensation-unsettled": case(
-        {
-            "words": WET + " --compensate offline",
-            "cut": DEEP,
-            **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED}, material=MEASURED),
-        },
-        {"cut": SHALLOW},
-    ),
     "force-input": case({"words": "call force -1"}, {"words": "call force 1"}),
     "material-missing": case(
         {"words": "call cut_of", "cell.toml": {"material": None}},
