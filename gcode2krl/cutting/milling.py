@@ -172,6 +172,7 @@ def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
     ------
     NotUnderstoodError
         Where the stock cannot be read, or the material has no force law.
+
     Examples
     --------
     >>> from gcode2krl import cut, load_cell, plan_motion, read_gcode

@@ -6,6 +6,7 @@ from gcode2krl import cut, load_cell, plan_motion, read_gcode, set_targets
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.cutting import mean_force
 from tests.remedies.bench import BASE, PREDICT, WET, call, case, laid
+from tests.remedies.cell import OWN_ROBOT
 from tests.remedies.program import FIVE, A
 
 LIGHT = {"Ktc": 200.0, "Krc": 60.0, "Kac": 30.0, "Kte": 2.0, "Kre": 2.0, "Kae": 0.5}
@@ -48,16 +49,7 @@ def all_joints(stiffness_Nmm_rad):
 
 
 STATED = all_joints(2e9)
-OWN_ROBOT = {
-    "model": None,
-    "geometry": {
-        "a1_mm": 330.0,
-        "a2_mm": -115.0,
-        "c1_mm": 645.0,
-        "c2_mm": 1150.0,
-        "c3_mm": 1220.0,
-        "c4_mm": 215.0,
-    },
+LIMITED_ROBOT = OWN_ROBOT | {
     "limits": {
         "q_deg": [
             [-185.0, 185.0],
@@ -233,7 +225,7 @@ CASES = {
     ),
     "stiffness-estimated": case({}, machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED})),
     "stiffness-unknown": case(
-        {"cell.toml": {"robot": OWN_ROBOT}},
+        {"cell.toml": {"robot": LIMITED_ROBOT}},
         {"cell.toml": {"robot": {"payload": {"mass_kg": 120.0, "reach_mm": 2701.0}}}},
     ),
     "near-mode": case(

@@ -120,6 +120,10 @@ class Signal:
         return self.tells_time
 
 
+_KINK_ROWS = 5
+"""Samples of a jump of the rate and one on either side."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
     """A measured signal (n, k), the inputs of its model, and which signals of the model it is."""
@@ -218,8 +222,9 @@ class Trace:
         """
         signals = self._plain
         values, own_s = values_of(signals, self.plus), signals.time_s
-        if self.still or not follows_path(self.plus) or len(own_s) < 5:
+        if self.still or not follows_path(self.plus) or len(own_s) < _KINK_ROWS:
             return np.zeros(self.shape)
+        # less what its neighbours have: an even acceleration is no kink
         jumps = np.diff(np.diff(values, axis=0) / np.diff(own_s)[:, None], axis=0)
         kinks = np.zeros_like(values)
         kinks[2:-2] = np.abs(jumps[1:-1] - 0.5 * (jumps[:-2] + jumps[2:]))

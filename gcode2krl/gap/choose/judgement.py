@@ -26,8 +26,8 @@ from gcode2krl.gap.fit.signatures import Signatures
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
-_SURE = 2.0
-"""Standard deviations of what is left."""
+_SURE_DEVIATIONS = 2.0
+"""Of the excess on data not used, beyond which it is no chance."""
 _LEAST_REST = 1e-6
 """Of the gap: nobody takes a share of less."""
 
@@ -251,7 +251,7 @@ def _leave_much(
     if not named or not trials or found.link.model_rms:
         return False
     size = sizes[-1] if len(named) == len(told) else pooled([trial.size_with(named) for trial in trials])
-    return size.share_left > _LIMITS.named_left and size.excess > _SURE * size.deviation
+    return size.share_left > _LIMITS.named_left and size.excess > _SURE_DEVIATIONS * size.deviation
 
 
 def _unnamed(cause: Cause) -> Cause:
