@@ -14,7 +14,7 @@ from gap_blind_words import flat, truth_of
 
 LINK = {"timing": "PATH", "joint_commanded": "PATH", "joint_actual": "SERVO", "joint_load": "GEAR"}
 LINK |= {"force": "FORCE", "tcp": "MECHANICS"}
-"""Signal of the answer -> its link's name in ``gcode2krl.gap.beside.links``."""
+"""Signal of the answer -> its link's name in ``gcode2krl.gap.compare.links``."""
 TRIALS = (0.25, 0.4, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0)
 
 
@@ -47,8 +47,8 @@ def oracle(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> d
 
 def _traces(link: str, runs: Sequence[Any], prediction: Any) -> list[Any]:
     """Return the measured signal of a link beside its model, run by run."""
-    from gcode2krl.gap.beside import links
-    from gcode2krl.gap.beside.pairing import pairs_of
+    from gcode2krl.gap.compare import links
+    from gcode2krl.gap.compare.pair import pairs_of
 
     found: list[Any] = getattr(links, link).traces(list(pairs_of(prediction, runs)))
     return found

@@ -1,9 +1,9 @@
 """Fit the probabilities of the diagnosis to stored cases of the check, and write their table.
 
 ``python benchmarks/gap_calibrate.py FOLDER`` reads the records that ``benchmarks/gap_blind.py`` has left in
-the folder of its ``--resume``, fits what ``gcode2krl/gap/choose/calibrated.py`` uses, prints its errors with
-whole effects left out and what each test is worth, and writes
-``gcode2krl/gap/thresholds/probabilities.json`` (or ``-o TABLE``).
+the folder of its ``--resume``, fits what ``gcode2krl/gap/posterior/calibrated.py`` uses, prints its errors
+with whole effects left out and what each test is worth, and writes ``gcode2krl/gap/probabilities.json`` (or
+``-o TABLE``).
 ``--made-up`` takes records that are made up, to try it.
 """
 
@@ -44,19 +44,19 @@ from gap_calibrate_rows import (
 )
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.calibrated import (
+from gcode2krl.gap.posterior.calibrated import (
     DEPENDENCE,
     FAMILY,
+    FAMILY_NAMES,
     NAME,
+    NAMES,
     UNKNOWN,
     Head,
     Probabilities,
     clipped,
     terms_of,
 )
-from gcode2krl.gap.choose.features import FAMILY_NAMES, NAMES
-from gcode2krl.gap.choose.probability_table import TABLE
-from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.gap.thresholds import TABLE, THRESHOLDS
 
 HEADS = (NAME, FAMILY, UNKNOWN, DEPENDENCE)
 CONVENTION_NATS = THRESHOLDS.choose.alike_chi2 / 2.0

@@ -16,7 +16,7 @@ import numpy as np
 from gap_calibrate_rows import OUTSIDE, Behind, Row
 
 from gcode2krl.arrays import Floats
-from gcode2krl.gap.choose.calibrated import (
+from gcode2krl.gap.posterior.calibrated import (
     DEPENDENCE,
     MOST_UNNAMED,
     NAME,

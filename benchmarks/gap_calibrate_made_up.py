@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gcode2krl.gap.choose.features import FamilyFeatures, Features
+from gcode2krl.gap.posterior.calibrated import FamilyFeatures, Features
 
 EFFECTS = ("backlash", "stiffness", "servo_lag", "thermal")
 OF_EACH = 6

@@ -12,15 +12,16 @@ from gap_blind_names import Truth, is_among, names
 from gap_blind_score import VERDICTS
 from gap_blind_words import truth_of
 
-from gcode2krl.gap.choose.calibrated import (
+from gcode2krl.gap.posterior.calibrated import (
     DEPENDENCE,
     FAMILY,
+    FAMILY_NAMES,
     FAMILY_TERMS,
     NAME,
+    NAMES,
     UNKNOWN,
     goodnesses,
 )
-from gcode2krl.gap.choose.features import FAMILY_NAMES, NAMES
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 OUTSIDE = ("open", "deleted")

@@ -27,7 +27,7 @@ from scipy.io import loadmat
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.operators import play
 from gcode2krl.gap import diagnose_log
-from gcode2krl.gap.tell.result import Gap
+from gcode2krl.gap.answer.result import Gap
 from gcode2krl.identify.kinematics import arm_named, identify_kinematics, read_readings
 from gcode2krl.runs import load_run
 from gcode2krl.runs.foreign import read_table, run_from

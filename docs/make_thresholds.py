@@ -7,15 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.gap.choose.calibrated import FAMILY_TERMS, TERMS, Scale, Terms
-from gcode2krl.gap.choose.probability_table import stated_table
-from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.gap.thresholds.stated import Threshold, listed
+from gcode2krl.gap.posterior.calibrated import FAMILY_TERMS, TERMS, Scale, Terms
+from gcode2krl.gap.thresholds import THRESHOLDS, Threshold, listed, stated_table
 
 PAGE = Path(__file__).with_name("thresholds.md")
 _HEAD = """# Thresholds of the diagnosis
 
-Made by `docs/make_thresholds.py` from `gcode2krl/gap/thresholds/`, a file a room of `gcode2krl/gap/`.
+Made by `docs/make_thresholds.py` from `gcode2krl/gap/thresholds.py`, a class a room.
 Change a number there, with its reason, run the script, and then the check in `docs/diagnose_check.md`.
 
 - **physics**: a law, an instrument, a standard, or the measured accuracy of a model.
@@ -35,8 +33,8 @@ _PROBABILITIES = """
 ## Probabilities
 
 P = 1 / (1 + exp(-b - Σ w·u)) of the goodness u of each test, 0 at the worst and 1 at the best value here and
-beyond (`gcode2krl/gap/choose/calibrated.py`; of two numbers the better one counts; of *unknown* the formula
-gives 1 - P). Weights and b are made by `benchmarks/gap_calibrate.py` from {cases}.
+beyond (`gcode2krl/gap/posterior/calibrated.py`; of two numbers the better one counts; of *unknown* the
+formula gives 1 - P). Weights and b are made by `benchmarks/gap_calibrate.py` from {cases}.
 Sets that cannot be told apart reach to {alike_nats:g} nats. A gap for which no effect was accepted is outside
 the library with P = {unknown_without_cause:g}.
 

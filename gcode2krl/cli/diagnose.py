@@ -106,8 +106,7 @@ def _written(
     """Write the page and the pictures that are asked for; return the files."""
     if html is None and plot is None:
         return []
-    from gcode2krl.gap.tell.html.one_file import write_page
-    from gcode2krl.gap.tell.html.pictures import write_pictures
+    from gcode2krl.gap.answer.page import write_page, write_pictures
 
     written = []
     with console.stage("drawing"):
@@ -160,6 +159,6 @@ def _apply(gap: "Gap", apply_to: str | None, cell_path: str | None, sources: lis
     """Write the named causes into a cell file, where one is given; return how many."""
     if apply_to is None:
         return 0
-    from gcode2krl.gap.tell.cell_effects import apply_to_cell
+    from gcode2krl.gap.answer.result import apply_to_cell
 
     return apply_to_cell(gap, Path(apply_to), Path(cell_path) if cell_path else None, sources)

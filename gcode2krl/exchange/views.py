@@ -9,9 +9,9 @@ from typing import Any
 
 VIEWS = {
     "prediction figure": "gcode2krl.figures:figure_of",
-    "gap words": "gcode2krl.gap.tell.looks:gap_words",
-    "gap page": "gcode2krl.gap.tell.looks:gap_html",
-    "gap figure": "gcode2krl.gap.tell.html.pictures:figure_of_run",
+    "gap words": "gcode2krl.gap.answer.words:gap_words",
+    "gap page": "gcode2krl.gap.answer.words:gap_html",
+    "gap figure": "gcode2krl.gap.answer.page:figure_of_run",
 }
 """What is shown to module and function."""
 

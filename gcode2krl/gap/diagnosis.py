@@ -8,25 +8,18 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue, RefusedError, input_error
-from gcode2krl.gap.beside.clocks import with_controller_clocks
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.events import rough_spans, sorted_out
-from gcode2krl.gap.beside.holdout import evenly_spread, split
-from gcode2krl.gap.beside.hum import without_hum
-from gcode2krl.gap.beside.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING, Link
-from gcode2krl.gap.beside.log_alone import log_pairs
-from gcode2krl.gap.beside.pairing import pairs_of
-from gcode2krl.gap.beside.retiming import on_own_timing
-from gcode2krl.gap.beside.trace import Span, Trace
-from gcode2krl.gap.choose.arm_geometry import geometry_of_arm
-from gcode2krl.gap.choose.candidates import question_of
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.choose.surface import judge_surface
-from gcode2krl.gap.slips.order import examine_set_up
-from gcode2krl.gap.tell.assembly import answer
-from gcode2krl.gap.tell.geometry_cause import with_geometry
-from gcode2krl.gap.tell.lateness import late_by, with_lateness
-from gcode2krl.gap.tell.result import Gap
+from gcode2krl.gap.answer.assembly import answer
+from gcode2krl.gap.answer.causes import late_by, with_geometry, with_lateness
+from gcode2krl.gap.answer.result import Gap
+from gcode2krl.gap.compare.clocks import on_own_timing, with_controller_clocks
+from gcode2krl.gap.compare.events import rough_spans, sorted_out, without_hum
+from gcode2krl.gap.compare.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING
+from gcode2krl.gap.compare.pair import log_pairs, pairs_of
+from gcode2krl.gap.compare.trace import Context, Link, Span, Trace, evenly_spread, split
+from gcode2krl.gap.posterior.examination import question_of
+from gcode2krl.gap.posterior.geometry import geometry_of_arm, judge_surface
+from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.posterior.set_up import examine_set_up
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.prediction import Prediction
 from gcode2krl.progress import Begin, unseen

@@ -1,4 +1,4 @@
-/* Sums of columns over blocks of rows (gap/fit/block_sums.py). */
+/* Sums of columns over blocks of rows (gap/noise/slow.py). */
 
 #include "core.h"
 

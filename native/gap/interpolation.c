@@ -1,4 +1,4 @@
-/* Signals between their samples (gap/beside/interpolation.py). */
+/* Signals between their samples (gap/compare/interpolation.py). */
 
 #include "search.h"
 

@@ -1,4 +1,4 @@
-/* Innovations of an autoregressive process plus parts that forget exponentially (gap/fit/kalman.py).
+/* Innovations of an autoregressive process plus parts that forget exponentially (gap/noise/short.py).
 
    The transition F is in observer form: row i < order has a_i in column 0 and 1 in column i + 1, a slow part has
    only its pole, on the diagonal. So a product with F takes one or two terms a number. Seen is the first state

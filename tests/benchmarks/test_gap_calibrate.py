@@ -7,7 +7,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.calibrated import FAMILY_TERMS, NAME, TERMS, Probabilities
+from gcode2krl.gap.posterior.calibrated import FAMILY_TERMS, NAME, TERMS, Probabilities
 from tests.benchmarks import hand_made
 
 assert hand_made.BENCHMARKS.is_dir()  # where the modules below are found

@@ -17,19 +17,19 @@ NAMES = {
 FILES = [
     *(
         file
-        for room in ("beside", "fit", "families", "choose")
+        for room in ("compare", "noise", "posterior")
         for file in sorted((PACKAGE / "gap" / room).rglob("*.py"))
+        if file.name not in ("slips.py", "set_up.py")  # a slip is an effect with a name
     ),
+    PACKAGE / "gap" / "components.py",
     PACKAGE / "gap" / "diagnosis.py",
     *sorted((PACKAGE / "effects").glob("*.py")),
 ]
 ALLOWED = {
     # words that mean something else there
-    "gap/beside/links/surface.py": {"mm", "diameter_mm"},  # a unit, and a key of a tool
-    "gap/beside/links/vectors.py": {"mm"},
-    "gap/choose/arm_geometry.py": {"mm"},
-    "gap/fit/refitting.py": {"scale"},  # the field of `Free`
-    "gap/fit/sensitivity.py": {"scale"},
+    "gap/compare/links.py": {"mm", "diameter_mm"},  # a unit, and a key of a tool
+    "gap/posterior/geometry.py": {"mm"},
+    "gap/posterior/likelihood.py": {"scale"},  # the field of `Free`
     "effects/coefficients.py": {"diameter_mm"},  # of a cell's tool
     # names that several effects share, and words of roles
     "effects/parameter.py": {"direction_x", "direction_y", "direction_z", "direction", "phase", "count"},

@@ -11,7 +11,7 @@ import pytest
 from gcode2krl import Issue, load_cell, predict, write_krl
 from gcode2krl.errors import told
 from gcode2krl.exchange.html import line_picture, path_picture
-from gcode2krl.gap.tell.result import Gap, GapSize, Unexplained, Where
+from gcode2krl.gap.answer.result import Gap, GapSize, Unexplained, Where
 from gcode2krl.runs import Run, RunHead, Tracker
 from tests.conftest import ROOT
 

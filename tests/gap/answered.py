@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.abscissa import Against
-from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
-from gcode2krl.gap.tell.result import (
+from gcode2krl.gap.answer.evidence import Against, Evidence, RunEvidence
+from gcode2krl.gap.answer.result import (
     AtPart,
     CauseResult,
     DependsOnResult,
@@ -19,6 +17,7 @@ from gcode2krl.gap.tell.result import (
     Unexplained,
     Where,
 )
+from gcode2krl.gap.posterior.cause_tests import Interval
 
 BACKLASH = CauseResult(
     effect="backlash",

@@ -16,20 +16,16 @@ from gcode2krl import load_cell, robot
 from gcode2krl.effects import Applied, Effect, Inputs, Parameter
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import input_error
-from gcode2krl.gap.beside.links import LINKS
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.beside.simulator import Simulator
-from gcode2krl.gap.beside.trace import Trace
-from gcode2krl.gap.choose.examination import Examination
-from gcode2krl.gap.choose.selection import examine
-from gcode2krl.gap.fit.design import Question
-from gcode2krl.gap.fit.gram import Gram, UsedColumns
-from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.nuisance import Nuisance
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.signatures import blocks_of
-from gcode2krl.gap.fit.split_columns import SplitColumns
+from gcode2krl.gap.compare.links import LINKS
+from gcode2krl.gap.compare.pair import Pair, Simulator
+from gcode2krl.gap.compare.trace import Trace
+from gcode2krl.gap.components import blocks_of
+from gcode2krl.gap.noise.nuisance import Nuisance, Question
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.examination import Examination
+from gcode2krl.gap.posterior.gram import Gram, SplitColumns, UsedColumns
+from gcode2krl.gap.posterior.likelihood import Likelihood, refit
+from gcode2krl.gap.posterior.selection import examine
 from gcode2krl.runs import Controller, Run, RunHead
 
 STEP_S = 0.02

@@ -12,7 +12,7 @@ from gcode2krl.cell import resolve_cell
 from gcode2krl.compliance import deflect
 from gcode2krl.effects import Applied, inputs_of, library, parse, simulate
 from gcode2krl.effects.chain import Inputs
-from gcode2krl.gap.beside.fine_prediction import refined_prediction
+from gcode2krl.gap.compare.pair import refined_prediction
 from gcode2krl.gcode import read_stream
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Controller, Force, Run, RunHead, Tracker
@@ -163,7 +163,7 @@ def _run(
     normal: bool,
     tracker_hz: float,
 ) -> Run:
-    from gcode2krl.gap.beside.interpolation import interpolate
+    from gcode2krl.gap.compare.interpolation import interpolate
 
     signals = simulate(inputs, effects)
     end = float(signals.time_s[-1])

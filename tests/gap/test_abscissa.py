@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Dependence
-from gcode2krl.gap.tell.abscissa import against, knows_place
+from gcode2krl.gap.answer.evidence import against, knows_place
 from tests.gap.constructed import HZ, joint_rates, joints, motion, trace
 
 TIME_S = motion().time_s

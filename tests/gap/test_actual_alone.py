@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gap import diagnose
-from gcode2krl.gap.tell.first_sentence import headline
+from gcode2krl.gap.answer.words import headline
 from gcode2krl.runs.foreign import run_or_log
 from tests.gap.synthetic import applied, prediction, runs, write_log
 

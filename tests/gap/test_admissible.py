@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.admissible import Admissible
+from gcode2krl.gap.compare.inputs import Admissible
 from tests.gap.constructed import motion, trace
 
 COUNT = 500

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.air import without_cuts
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import without_cuts
 from tests.gap.synthetic import TRUE_STEP_S, applied, prediction, runs
 
 

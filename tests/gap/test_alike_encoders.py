@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.gap_size import size_of_gap
-from gcode2krl.gap.fit.noise import Slow, drawn_slow
-from gcode2krl.gap.fit.noise_source import noise_of
+from gcode2krl.gap.noise.short import Slow, drawn_slow
+from gcode2krl.gap.noise.source import noise_of
+from gcode2krl.gap.posterior.examination import size_of_gap
 from tests.gap.constructed import noise, trace
 
 COUNT, SIGMA = 2000, 2e-4

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.errors import Issue
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.as_json import SCHEMA, gap_object, plain
-from gcode2krl.gap.tell.result import (
+from gcode2krl.gap.answer.result import (
+    SCHEMA,
     CauseResult,
     DependsOnResult,
     EffectAt,
@@ -21,7 +20,10 @@ from gcode2krl.gap.tell.result import (
     Unexplained,
     UnknownAt,
     Where,
+    gap_object,
+    plain,
 )
+from gcode2krl.gap.posterior.cause_tests import Interval
 
 
 def _cause(**more):

@@ -9,16 +9,16 @@ import pytest
 from gcode2krl.effects import Dependence, inputs_of
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PATH, SERVO
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.judged import Cause, Judgement
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell import assembly
-from gcode2krl.gap.tell.evidence import Depends
-from gcode2krl.gap.tell.result import DependsOnResult, Unexplained
+from gcode2krl.gap.answer import assembly
+from gcode2krl.gap.answer.evidence import Depends
+from gcode2krl.gap.answer.result import DependsOnResult, Unexplained
+from gcode2krl.gap.compare.links import FORCE, GEAR, MECHANICS, PATH, SERVO
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import Slip
+from gcode2krl.gap.compare.trace import Context
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.examination import Size
+from gcode2krl.gap.posterior.judgement import Cause, Judgement
 from gcode2krl.runs import Run, RunHead
 from tests.gap.synthetic import LIBRARY, applied, prediction
 

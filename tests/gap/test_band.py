@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.band import Bands
+from gcode2krl.gap.compare.interpolation import Bands
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 40, 101])

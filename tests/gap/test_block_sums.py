@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcode2krl.gap.fit.block_sums import sums_between
+from gcode2krl.gap.noise.slow import sums_between
 
 
 def test_each_block_is_summed_by_itself():

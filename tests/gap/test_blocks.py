@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcode2krl.gap.fit.blocks import block_means
+from gcode2krl.gap.noise.slow import block_means
 from tests.gap.constructed import columns_nuisance, motion, noise, trace
 
 COUNT = 500

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from gcode2krl.gap.fit.box import MOST, boxed
+from gcode2krl.gap.posterior.gram import MOST, boxed
 
 FITS = 300
 

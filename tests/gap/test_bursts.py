@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.bursts import loud_rows
+from gcode2krl.gap.compare.events import loud_rows
 from tests.gap.constructed import noise
 
 COUNT = 1500

@@ -7,20 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.calibrated import (
+from gcode2krl.gap.posterior.calibrated import (
     DEPENDENCE,
     FAMILY_TERMS,
     NAME,
+    NAMES,
     TERMS,
     UNKNOWN,
+    FamilyFeatures,
+    Features,
     Head,
     Probabilities,
     Scale,
     goodnesses,
     probabilities_table,
 )
-from gcode2krl.gap.choose.features import NAMES, FamilyFeatures, Features
-from gcode2krl.gap.choose.probability_table import TABLE, stated_table
+from gcode2krl.gap.thresholds import TABLE, stated_table
 
 GOOD = Features(
     surprise=300.0,

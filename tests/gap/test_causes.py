@@ -7,12 +7,12 @@ import pytest
 
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.links import GEAR, PATH
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.judged import Cause
-from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.causes import cause_of, slip_cause
-from gcode2krl.gap.tell.result import EffectAt, RivalResult, UnknownAt
+from gcode2krl.gap.answer.causes import cause_of, slip_cause
+from gcode2krl.gap.answer.result import EffectAt, RivalResult, UnknownAt
+from gcode2krl.gap.compare.links import GEAR, PATH
+from gcode2krl.gap.compare.slips import Slip
+from gcode2krl.gap.posterior.cause_tests import Interval
+from gcode2krl.gap.posterior.judgement import Cause
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import applied
 

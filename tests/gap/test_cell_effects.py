@@ -8,7 +8,7 @@ import pytest
 from gcode2krl import load_cell
 from gcode2krl.effects import Applied, from_cell, library
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.tell.cell_effects import apply_to_cell
+from gcode2krl.gap.answer.result import apply_to_cell
 from tests.gap.test_report import GAP
 
 LIBRARY = library()

@@ -6,8 +6,8 @@ import pytest
 
 from gcode2krl.effects import inputs_of
 from gcode2krl.errors import Issue
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.checks import CheckTest, checked
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import CheckTest, checked
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, prediction, runs
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.links import MECHANICS, PATH
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.clock import ClockTest
+from gcode2krl.gap.compare.links import MECHANICS, PATH
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import ClockTest
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, prediction, runs
 
 

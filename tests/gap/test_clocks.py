@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.clocks import (
+from gcode2krl.gap.compare.clocks import (
     coarse_offset,
     fitted_offset,
     with_coarse_clocks,
     with_controller_clocks,
     with_table_clock,
 )
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import PATH
+from gcode2krl.gap.compare.links import PATH
+from gcode2krl.gap.compare.trace import Context
 from gcode2krl.runs import Tracker
 from tests.gap.constructed import controller, joints, motion, noise, pair, trace
 

@@ -3,9 +3,8 @@
 import numpy as np
 from scipy.sparse import csr_array
 
-from gcode2krl.gap.families.columns import Beside, Columns
-from gcode2krl.gap.families.steps import Steps
-from gcode2krl.gap.families.view import View
+from gcode2krl.gap.posterior.families import Beside, Columns, View
+from gcode2krl.gap.posterior.study import Steps
 from tests.gap import constructed as c
 from tests.gap.test_families import view_of
 

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from gcode2krl.cli import diagnose
 from gcode2krl.cli.main import main
-from gcode2krl.gap.tell.result import Where
+from gcode2krl.gap.answer.result import Where
 from tests.gap.answered import GAP, STRETCH, evidence
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import robot
-from gcode2krl.gap.beside.commanded import Curve, commanded_path, on_the_curve
+from gcode2krl.gap.compare.slips import Curve, commanded_path, on_the_curve
 from gcode2krl.runs import RunHead
 from tests.gap.constructed import controller, joints, motion, pair
 

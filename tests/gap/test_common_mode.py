@@ -8,9 +8,9 @@ from gcode2krl.effects.builtin.servo_lag import ServoLag
 from gcode2krl.effects.inputs import resampled
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.effects.operators import lag
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.fit.design import Question
-from gcode2krl.gap.fit.signatures import blocks_of
+from gcode2krl.gap.components import blocks_of
+from gcode2krl.gap.noise.nuisance import Question
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap import constructed as c
 
 pytestmark = pytest.mark.slow

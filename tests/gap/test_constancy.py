@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import library
-from gcode2krl.gap.choose import constancy
-from gcode2krl.gap.choose.constancy import constancy_of, spread_between_runs
-from gcode2krl.gap.choose.intervals import intervals_of
-from gcode2krl.gap.choose.selection import examine
+from gcode2krl.gap.posterior import cause_tests
+from gcode2krl.gap.posterior.cause_tests import constancy_of, intervals_of, spread_between_runs
+from gcode2krl.gap.posterior.selection import examine
 from tests.gap.constructed import LINK, applied, examined, motion, noise, question, split, trace, wave
 from tests.gap.test_counted_once import examined as with_clocks
 from tests.gap.test_counted_once import late_encoders
@@ -98,7 +97,7 @@ def test_a_run_whose_own_zero_hides_the_effect_says_nothing_of_its_size():
     rows = np.ones(400, dtype=bool)
     step = np.where(np.arange(400) < 200, np.arange(400) >= 100, 1.0)  # in the first of two runs
     zeros = 1e3 * np.stack([np.arange(400) < 200, np.arange(400) >= 200], axis=1)
-    both = constancy._Residual(
+    both = cause_tests._Residual(
         left=noise(400, 1)[:, 0],
         change=5.0 * step,
         nuisance=split(zeros, np.repeat([0, 1], 200)),

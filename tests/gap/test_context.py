@@ -7,10 +7,10 @@ import pytest
 
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import MECHANICS, PATH, SERVO
-from gcode2krl.gap.choose.candidates import question_of
-from gcode2krl.gap.fit.signatures import strongest_hz
+from gcode2krl.gap.compare.links import MECHANICS, PATH, SERVO
+from gcode2krl.gap.compare.trace import Context
+from gcode2krl.gap.components import strongest_hz
+from gcode2krl.gap.posterior.examination import question_of
 from tests.gap.constructed import Added, applied, motion, noise, pair, stub, trace
 
 LIBRARY = library()

@@ -9,11 +9,9 @@ import pytest
 from gcode2krl import load_cell
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.inputs import gradient
-from gcode2krl.gap.beside.corners import Corners
-from gcode2krl.gap.beside.pairing import _shared
-from gcode2krl.gap.beside.planning import with_corners
-from gcode2krl.gap.beside.simulator import Simulator
-from gcode2krl.gap.choose.gap_size import moments_off
+from gcode2krl.gap.compare.inputs import Corners
+from gcode2krl.gap.compare.pair import Simulator, _shared, with_corners
+from gcode2krl.gap.posterior.examination import moments_off
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
 from tests.gap.constructed import trace

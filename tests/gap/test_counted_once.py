@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.choose.mismatch import within_mismatch
-from gcode2krl.gap.choose.selection import examine
-from gcode2krl.gap.choose.set_clocks import with_set_clocks
-from gcode2krl.gap.fit.counted_once import CountedOnce
-from gcode2krl.gap.fit.design import NuisanceDesign
-from gcode2krl.gap.fit.signatures import Signatures, blocks_of
+from gcode2krl.gap.components import Signatures, blocks_of
+from gcode2krl.gap.noise.nuisance import NuisanceDesign
+from gcode2krl.gap.posterior.judgement import with_set_clocks
+from gcode2krl.gap.posterior.likelihood import CountedOnce
+from gcode2krl.gap.posterior.selection import examine, within_mismatch
 from tests.gap.constructed import LINK, columns_nuisance, joints, likelihood, motion, noise, question, trace
 
 CLOCK = library()["clock"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.beside.admissible import Admissible
-from gcode2krl.gap.tell.course import course_of
+from gcode2krl.gap.answer.causes import course_of
+from gcode2krl.gap.compare.inputs import Admissible
 from tests.gap import constructed as c
 
 TRACE = c.trace(np.zeros((500, 3)), "mechanics")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.decimals import resolution, step_of
+from gcode2krl.gap.compare.interpolation import resolution, step_of
 
 
 @pytest.mark.parametrize("step", [0.5, 0.01, 1e-5])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.features import family_features
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.dependences import depends_on
+from gcode2krl.gap.answer.causes import depends_on
+from gcode2krl.gap.posterior.calibrated import family_features
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

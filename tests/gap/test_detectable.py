@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Parameter, Role, library
-from gcode2krl.gap.choose.detectable import observable
-from gcode2krl.gap.choose.scoring import threshold
+from gcode2krl.gap.posterior.examination import observable
+from gcode2krl.gap.posterior.selection import threshold
 from tests.gap.constructed import examined, motion, noise, question, trace, wave
 
 COUNT, SIGMA = 500, 1e-4

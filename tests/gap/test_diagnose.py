@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap import Gap, diagnose, text_report
-from gcode2krl.gap.tell.as_json import SCHEMA
-from gcode2krl.gap.tell.result import EffectAt
+from gcode2krl.gap.answer.result import SCHEMA, EffectAt
 from gcode2krl.runs import RunHead
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.beside.admissible import Admissible
-from gcode2krl.gap.families.directions import along_one
+from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.posterior.study import along_one
 from tests.gap import constructed as c
 from tests.gap.test_families import COUNT, best_of
 

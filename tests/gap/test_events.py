@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.events import rough_spans, sorted_out
-from gcode2krl.gap.beside.trace import Whose
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.events import events_of, impulses_of
+from gcode2krl.gap.answer.words import events_of, impulses_of
+from gcode2krl.gap.compare.events import rough_spans, sorted_out
+from gcode2krl.gap.compare.trace import Whose
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 STEP_S, SECONDS = 0.01, 20.0

@@ -8,8 +8,7 @@ import pytest
 
 from gcode2krl import robot
 from gcode2krl.effects import Dependence
-from gcode2krl.gap.tell.evidence import Depends, evidence_of, tip_of
-from gcode2krl.gap.tell.residuals import Residual
+from gcode2krl.gap.answer.evidence import Depends, Residual, evidence_of, tip_of
 from tests.gap.constructed import LINK, cell, motion, trace
 
 NOWHERE = replace(motion(), position_mm=np.zeros((500, 3)))

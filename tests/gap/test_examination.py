@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.examination import Examination
+from gcode2krl.gap.posterior.examination import Examination
 from tests.gap.constructed import STEP_S, Added, examined, noise, trace
 
 SIGMA, COUNT = 1e-4, 400

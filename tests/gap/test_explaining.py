@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from gcode2krl.gap.beside.admissible import Admissible
-from gcode2krl.gap.fit.blocks import block_means
-from gcode2krl.gap.fit.explaining import explaining_columns
-from gcode2krl.gap.fit.slow_noise import slow_parts_of
+from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.noise.slow import block_means, explaining_columns, slow_parts_of
 from tests.gap.constructed import motion, noise, trace
 
 COUNT = 1000

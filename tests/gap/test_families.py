@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.beside.admissible import Admissible
-from gcode2krl.gap.families.columns import Columns
-from gcode2krl.gap.families.evidence import AMPLITUDES, evidence_of, log_evidence, log_mean
-from gcode2krl.gap.families.functions import (
+from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.components import (
+    Grid,
+    Place,
     free,
     odd,
     polynomials,
@@ -18,11 +18,17 @@ from gcode2krl.gap.families.functions import (
     smooth_in_each,
     smooth_sum,
 )
-from gcode2krl.gap.families.grid import Grid, Place
-from gcode2krl.gap.families.rows import Rows
-from gcode2krl.gap.families.study import studies
-from gcode2krl.gap.families.view import View
-from gcode2krl.gap.thresholds.families import FamilyThresholds
+from gcode2krl.gap.posterior.families import (
+    AMPLITUDES,
+    Columns,
+    Rows,
+    View,
+    evidence_of,
+    log_evidence,
+    log_mean,
+)
+from gcode2krl.gap.posterior.study import studies
+from gcode2krl.gap.thresholds import FamilyThresholds
 from tests.gap import constructed as c
 
 COUNT = 500

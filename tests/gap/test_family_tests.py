@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.choose.family_tests import FamilyTests, LinkFamilies, Rest, net_gain
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.families.study import Study
+from gcode2krl.gap.posterior.cause_tests import FamilyTests, LinkFamilies, Rest, net_gain
+from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.posterior.study import Study
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

@@ -5,10 +5,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.features import MOST_NATS, NAMES, FamilyFeatures, Features, family_features
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.as_json import plain
-from gcode2krl.gap.tell.causes import cause_of
+from gcode2krl.gap.answer.causes import cause_of
+from gcode2krl.gap.answer.result import plain
+from gcode2krl.gap.posterior.calibrated import MOST_NATS, NAMES, FamilyFeatures, Features, family_features
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 COUNT, SIGMA = 500, 1e-4

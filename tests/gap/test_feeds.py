@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.commanded import commanded_path
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.feeds import other_feeds
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import commanded_path, other_feeds
 from tests.gap.synthetic import TRUE_STEP_S, prediction, runs
 
 

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.first_sentence import amount, headline, stretch
-from gcode2krl.gap.tell.result import (
+from gcode2krl.gap.answer.result import (
     AtPart,
     EventResult,
     JointResult,
@@ -16,6 +14,8 @@ from gcode2krl.gap.tell.result import (
     RunSize,
     Where,
 )
+from gcode2krl.gap.answer.words import amount, headline, stretch
+from gcode2krl.gap.posterior.cause_tests import Interval
 from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, TIP, UNEXPLAINED, UNSURE
 
 

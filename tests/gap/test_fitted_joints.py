@@ -7,9 +7,9 @@ import pytest
 
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.fitted_joints import fitted_signal
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.examination import fitted_signal
 from tests.gap.constructed import (
     applied,
     joint_rates,

@@ -4,10 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gcode2krl.gap.beside.holdout import folds_of
-from gcode2krl.gap.beside.links import SERVO
-from gcode2krl.gap.beside.simulator import Simulator
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.compare.links import SERVO
+from gcode2krl.gap.compare.pair import Simulator
+from gcode2krl.gap.compare.trace import Trace, folds_of
 
 COUNT, STEP_S = 2000, 0.01
 

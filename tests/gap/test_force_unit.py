@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.force_unit import _UNITS, ForceUnitTest
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import _UNITS, ForceUnitTest
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, prediction, runs
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.events import sorted_out
-from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.compare.events import sorted_out
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, Added, motion, question, trace, wave
 
 pytestmark = pytest.mark.slow

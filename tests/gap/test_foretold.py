@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.choose.foretold import Foretold, foretold_of
-from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.posterior.next_run import Foretold, foretold_of
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.frames import FrameTest, frame_values
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.posterior.set_up import FrameTest, frame_values
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 

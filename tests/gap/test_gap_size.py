@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.stats import norm, t
 
-from gcode2krl.gap.beside.events import command_changes
-from gcode2krl.gap.choose.gap_size import Size, size_of_gap
-from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, white
+from gcode2krl.gap.compare.events import command_changes
+from gcode2krl.gap.noise.short import Noise, Slow, drawn_noise, white
+from gcode2krl.gap.posterior.examination import Size, size_of_gap
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
 
 pytestmark = pytest.mark.slow

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.holdout import evenly_spread, folds_of, split, with_rows
+from gcode2krl.gap.compare.trace import evenly_spread, folds_of, split, with_rows
 from tests.gap.constructed import motion, trace
 
 GUARD_S = 1.0

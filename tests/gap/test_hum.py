@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.hum import without_hum
+from gcode2krl.gap.compare.events import without_hum
 from tests.gap.constructed import motion, noise, trace
 
 COUNT, STEP_S = 5000, 0.004

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import FORCE, MECHANICS
-from gcode2krl.gap.beside.pairing import pairs_of
-from gcode2krl.gap.choose.candidates import question_of
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.dependences import depends_on
+from gcode2krl.gap.answer.causes import depends_on
+from gcode2krl.gap.compare.links import FORCE, MECHANICS
+from gcode2krl.gap.compare.pair import pairs_of
+from gcode2krl.gap.compare.trace import Context
+from gcode2krl.gap.posterior.examination import question_of
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.synthetic import LIBRARY, applied, refined, runs
 
 pytestmark = pytest.mark.slow

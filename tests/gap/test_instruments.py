@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.codes import all_codes
-from gcode2krl.gap.beside.events import sorted_out
-from gcode2krl.gap.fit.noise import Slow, white
-from gcode2krl.gap.tell.instruments import issues_of, noise_of, readings_of_noise
+from gcode2krl.gap.answer.causes import issues_of, noise_of, readings_of_noise
+from gcode2krl.gap.compare.events import sorted_out
+from gcode2krl.gap.noise.short import Slow, white
 from tests.gap.constructed import LINK, motion, noise, stub, trace
 
 SIGMA = 2.0

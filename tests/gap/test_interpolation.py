@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from gcode2krl.effects import simulate
-from gcode2krl.gap.beside.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.compare.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
 from tests.gap.constructed import applied, joints, motion, wave
 
 GENERATOR = np.random.default_rng(1)

@@ -7,11 +7,11 @@ import pytest
 from scipy import stats
 
 from gcode2krl.effects import Applied, Parameter, library
-from gcode2krl.gap.beside.stretches import stretches_of_all
-from gcode2krl.gap.choose.intervals import covariance_of, intervals_of
-from gcode2krl.gap.fit.fitted import Fitted, Numbers
-from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import white
+from gcode2krl.gap.compare.trace import stretches_of_all
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.cause_tests import covariance_of, intervals_of
+from gcode2krl.gap.posterior.least_squares import Fitted, Numbers
+from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import examined, motion, noise, question, refitted, trace, wave
 

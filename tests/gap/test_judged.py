@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.beside.links import SERVO
-from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.judged import NAMED, Cause, Judged
+from gcode2krl.gap.compare.links import SERVO
+from gcode2krl.gap.posterior.examination import Size
+from gcode2krl.gap.posterior.judgement import NAMED, Cause, Judged
 from tests.gap.synthetic import applied
 
 SIZE = Size(100, 4.0, 1.0, 0.25, 0.25, 0.0, 1.0, 1.0, 5.0, 2.0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.verdict import is_lost
-from gcode2krl.gap.choose.judgement import judge
+from gcode2krl.gap.compare.trace import is_lost
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 COUNT, SIGMA = 500, 1e-4

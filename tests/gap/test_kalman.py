@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from gcode2krl.gap.fit.kalman import innovation_gains, innovations, transition_of
+from gcode2krl.gap.noise.short import innovation_gains, innovations, transition_of
 
 A = np.array([0.9, -0.3])
 SLOW = [(0.98, 1.5)]

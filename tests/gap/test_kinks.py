@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.nuisance import nuisance_of
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import nuisance_of
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.likelihood import Likelihood
 from tests.gap.constructed import motion, trace
 
 TURN_S, JUMP, SIGMA = 5.0, 0.2, 1e-6

@@ -13,14 +13,19 @@ from scipy.linalg import toeplitz
 from scipy.optimize import lsq_linear
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.fit.box import MOST
-from gcode2krl.gap.fit.clusters import cluster_scores, clustered_covariance, gain_inflation
-from gcode2krl.gap.fit.fitted import Numbers
-from gcode2krl.gap.fit.hooke_jeeves import pattern_search
-from gcode2krl.gap.fit.least_squares import Box, Damped, Shortened, derivative, gauss_newton
-from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import Noise, Slow
-from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.noise.nuisance import Nuisance
+from gcode2krl.gap.noise.short import Noise, Slow
+from gcode2krl.gap.posterior.gram import MOST, cluster_scores, clustered_covariance, gain_inflation
+from gcode2krl.gap.posterior.least_squares import (
+    Box,
+    Damped,
+    Numbers,
+    Shortened,
+    derivative,
+    gauss_newton,
+    pattern_search,
+)
+from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 PRIOR = THRESHOLDS.fit.prior_sizes

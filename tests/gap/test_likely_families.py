@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.calibrated import probabilities_table
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.choose.likely_families import family_probabilities
+from gcode2krl.gap.posterior.calibrated import family_probabilities, probabilities_table
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.fit.lines import without_lines
-from gcode2krl.gap.fit.noise import Noise, drawn_noise
+from gcode2krl.gap.noise.short import Noise, drawn_noise, without_lines
 
 COUNT = 1500
 

@@ -5,13 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.links import GEAR, LINKS, MECHANICS, PATH, SERVO, SIGNALS, TIMING
-from gcode2krl.gap.beside.links.base import Link, is_lost
-from gcode2krl.gap.beside.links.joints import logged_correction
-from gcode2krl.gap.beside.links.surface import SurfaceLink
-from gcode2krl.gap.beside.links.timing import TimingLink
-from gcode2krl.gap.beside.links.traces import at_edges
-from gcode2krl.gap.beside.links.vectors import ForceLink
+from gcode2krl.gap.compare.links import (
+    GEAR,
+    LINKS,
+    MECHANICS,
+    PATH,
+    SERVO,
+    SIGNALS,
+    TIMING,
+    ForceLink,
+    SurfaceLink,
+    TimingLink,
+    at_edges,
+    logged_correction,
+)
+from gcode2krl.gap.compare.trace import Link, is_lost
 from gcode2krl.runs import Force, RunHead, Tracker
 from tests.gap.constructed import controller, joints, motion, pair, stub
 

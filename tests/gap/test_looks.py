@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gcode2krl import Gcode2KrlError
-from gcode2krl.gap.tell.evidence import Evidence, RunEvidence
-from gcode2krl.gap.tell.looks import gap_html, gap_words
-from gcode2krl.gap.tell.result import AtPart, Gap, GapSize, LinkResult, Unexplained, Where
+from gcode2krl.gap.answer.evidence import Evidence, RunEvidence
+from gcode2krl.gap.answer.result import AtPart, Gap, GapSize, LinkResult, Unexplained, Where
+from gcode2krl.gap.answer.words import gap_html, gap_words
 
 
 def run(name):

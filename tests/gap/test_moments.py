@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import library
-from gcode2krl.gap.fit.moments import jumps, strongest_moments
-from gcode2krl.gap.fit.numbers import free_of
-from gcode2krl.gap.fit.signatures import Signatures, blocks_from
+from gcode2krl.gap.components import Signatures, blocks_from
+from gcode2krl.gap.noise.source import jumps, strongest_moments
+from gcode2krl.gap.posterior.least_squares import free_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import stub, trace
 

@@ -5,12 +5,10 @@ import pytest
 from scipy.sparse import csr_array
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.families.columns import Columns
-from gcode2krl.gap.families.evidence import evidence_of, moved_evidence
-from gcode2krl.gap.families.grid import Place
-from gcode2krl.gap.families.study import Study
-from gcode2krl.gap.families.view import View
-from gcode2krl.gap.fit.split_columns import SplitColumns
+from gcode2krl.gap.components import Place
+from gcode2krl.gap.posterior.families import Columns, View, evidence_of, moved_evidence
+from gcode2krl.gap.posterior.gram import SplitColumns
+from gcode2krl.gap.posterior.study import Study
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 COUNT, RUNS = 400, 3

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence, Where
-from gcode2krl.gap.families.evidence import Evidence
-from gcode2krl.gap.families.grid import Place
-from gcode2krl.gap.families.nested import CONTAINS, simplest_first
+from gcode2krl.gap.components import Place
+from gcode2krl.gap.posterior.families import Evidence
+from gcode2krl.gap.posterior.study import CONTAINS, simplest_first
 
 
 def evidence(on, nats, place="tip"):

@@ -10,10 +10,12 @@ import pytest
 from gcode2krl.canned.trial import trials_of
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.judged import Cause
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.choose.next_run import (
+from gcode2krl.gap.answer.causes import next_run_of, shown, told
+from gcode2krl.gap.answer.result import DependsOnResult
+from gcode2krl.gap.posterior.judgement import Cause, judge
+from gcode2krl.gap.posterior.next_run import (
     Answer,
+    Apart,
     Choice,
     Family,
     OpenPair,
@@ -22,10 +24,7 @@ from gcode2krl.gap.choose.next_run import (
     choose_next_run,
     open_pairs,
 )
-from gcode2krl.gap.choose.rivals import Rival
-from gcode2krl.gap.choose.separation import Apart
-from gcode2krl.gap.tell.next_run import next_run_of, shown, told
-from gcode2krl.gap.tell.result import DependsOnResult
+from gcode2krl.gap.posterior.selection import Rival
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import LINK, cell, noise, question, stub, trace
 from tests.gap.test_separation import ALONG_X, SIGMA_MM, TRIALS, at, measured

@@ -3,8 +3,8 @@
 import pytest
 
 from gcode2krl.canned import draft_of, place_of, predicted
+from gcode2krl.gap.answer.result import EffectAt
 from gcode2krl.gap.diagnosis import diagnose
-from gcode2krl.gap.tell.result import EffectAt
 from tests.gap.synthetic import applied, prediction, runs
 
 

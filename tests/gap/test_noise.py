@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_triangular, toeplitz
 
-from gcode2krl.gap.fit.noise import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased, white
+from gcode2krl.gap.noise.short import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased, white
 
 
 def _segments(count):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gcode2krl.gap.choose.gap_size import _share_in_step
+from gcode2krl.gap.posterior.examination import _share_in_step
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 MOMENTS, ROWS, APART = 1000, 12, 6.0

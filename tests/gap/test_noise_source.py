@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise, drawn_slow
-from gcode2krl.gap.fit.noise_source import noise_of
+from gcode2krl.gap.noise.short import Noise, Slow, drawn_noise, drawn_slow
+from gcode2krl.gap.noise.source import noise_of
 from tests.gap.constructed import applied, columns_nuisance, motion, noise, trace, wave
 
 COUNT, SIGMA = 2000, 2e-4

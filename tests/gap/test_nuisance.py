@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from gcode2krl import robot
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.instruments import CLOCK
-from gcode2krl.gap.fit.box import MOST
-from gcode2krl.gap.fit.nuisance import nuisance_of
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.compare.links import CLOCK
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import nuisance_of
+from gcode2krl.gap.posterior.gram import MOST
 from tests.gap.constructed import joint_rates, motion, trace
 
 BOUNDS = Mismatch()

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.fit.fitted import Fitted, Numbers
-from gcode2krl.gap.fit.numbers import free_of
+from gcode2krl.gap.posterior.least_squares import Fitted, Numbers, free_of
 from tests.gap.constructed import trace
 
 LIBRARY = library()

@@ -8,10 +8,8 @@ import lxml.html
 import pytest
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.tell.first_sentence import headline
-from gcode2krl.gap.tell.html.one_file import page, write_page
-from gcode2krl.gap.tell.result import (
-    Constancy,
+from gcode2krl.gap.answer.page import page, write_page
+from gcode2krl.gap.answer.result import (
     Course,
     EffectAt,
     EventResult,
@@ -22,6 +20,8 @@ from gcode2krl.gap.tell.result import (
     Separates,
     Where,
 )
+from gcode2krl.gap.answer.words import headline
+from gcode2krl.gap.posterior.cause_tests import Constancy
 from tests.gap.answered import BACKLASH, GAP, LAG, STEP, STRETCH, UNEXPLAINED, UNSURE, evidence, run_evidence
 
 WHERE = Where(intervals=(STRETCH, replace(STRETCH, share=0.1)))

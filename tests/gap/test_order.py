@@ -7,11 +7,10 @@ import pytest
 from gcode2krl.effects import inputs_of
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips import order
-from gcode2krl.gap.slips.checks import CheckTest
-from gcode2krl.gap.slips.clock import ClockTest
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import CheckTest, ClockTest
+from gcode2krl.gap.compare.trace import Context
+from gcode2krl.gap.posterior import set_up
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 
@@ -25,7 +24,7 @@ def _context(text="", exclude=(), **signals):
 
 
 def test_every_effect_that_a_test_looks_for_is_in_the_library():
-    for test in (*order.TESTS, CheckTest(()), ClockTest()):
+    for test in (*set_up.TESTS, CheckTest(()), ClockTest()):
         assert test.effects
         assert set(test.effects) <= set(LIBRARY)
 
@@ -42,27 +41,27 @@ def test_the_first_test_that_finds_a_slip_ends_the_search(monkeypatch):
             return self.slips
 
     tests = [Finds([]), Finds(["first"]), Finds(["second"])]
-    monkeypatch.setattr(order, "TESTS", tuple(tests))
-    assert order.first_slip([], LIBRARY) == ["first"]
+    monkeypatch.setattr(set_up, "TESTS", tuple(tests))
+    assert set_up.first_slip([], LIBRARY) == ["first"]
     assert [test.asked for test in tests] == [True, True, False]
 
 
 def test_the_checks_of_the_runs_come_last():
     issue = Issue("error", "run-unit", 2, "controller.csv: radians", "")
     override = _context("override:percent=60", tracker=False)
-    slips = order.first_slip(override.pairs, LIBRARY, [issue])
+    slips = set_up.first_slip(override.pairs, LIBRARY, [issue])
     assert [slip.applied.effect.name for slip in slips] == ["override"]
     sound = _context(tracker=False)
-    slips = order.first_slip(sound.pairs, LIBRARY, [issue])
+    slips = set_up.first_slip(sound.pairs, LIBRARY, [issue])
     assert [(slip.applied.effect.name, slip.final) for slip in slips] == [("unit", True)]
 
 
 def test_a_sound_run_has_no_slip_and_stays_as_it_is():
     context = _context(tracker=False)
-    set_up = order.examine_set_up(context)
-    assert (set_up.slips, set_up.issues, set_up.is_final) == ([], [], False)
-    assert set_up.context.slips == ()
-    assert set_up.context.pairs[0].inputs is context.pairs[0].inputs
+    examined = set_up.examine_set_up(context)
+    assert (examined.slips, examined.issues, examined.is_final) == ([], [], False)
+    assert examined.context.slips == ()
+    assert examined.context.pairs[0].inputs is context.pairs[0].inputs
 
 
 @pytest.mark.slow
@@ -71,21 +70,21 @@ def test_a_wrong_clock_is_named_and_taken_off_besides_another_slip():
     table = context.pairs[0].run.controller
     late = replace(context.pairs[0].run, controller=replace(table, time_s=table.time_s + 2.0))
     context = context.with_pairs([replace(context.pairs[0], run=late)])
-    set_up = order.examine_set_up(context)
-    assert [slip.applied.effect.name for slip in set_up.slips] == ["base_number", "clock"]
-    assert set_up.slips[1].applied["offset_s"] == pytest.approx(2.0, abs=0.01)
-    assert set_up.context.pairs[0].clock_s["controller"] == pytest.approx(2.0, abs=0.01)
-    assert [one.effect.name for one in set_up.context.slips] == ["base_number"]
+    examined = set_up.examine_set_up(context)
+    assert [slip.applied.effect.name for slip in examined.slips] == ["base_number", "clock"]
+    assert examined.slips[1].applied["offset_s"] == pytest.approx(2.0, abs=0.01)
+    assert examined.context.pairs[0].clock_s["controller"] == pytest.approx(2.0, abs=0.01)
+    assert [one.effect.name for one in examined.context.slips] == ["base_number"]
 
 
 @pytest.mark.slow
 def test_stops_come_first_and_are_in_the_plan():
     context = _context("advance_stop:count=2,hold_s=0.08", tracker=False)
-    set_up = order.examine_set_up(context)
-    assert [slip.applied.effect.name for slip in set_up.slips] == ["advance_stop"]
-    assert set_up.context.stopped
-    assert set_up.context.pairs[0].inputs.time_s[-1] > context.pairs[0].inputs.time_s[-1] + 0.1
-    without = order.examine_set_up(
+    examined = set_up.examine_set_up(context)
+    assert [slip.applied.effect.name for slip in examined.slips] == ["advance_stop"]
+    assert examined.context.stopped
+    assert examined.context.pairs[0].inputs.time_s[-1] > context.pairs[0].inputs.time_s[-1] + 0.1
+    without = set_up.examine_set_up(
         _context("advance_stop:count=2,hold_s=0.08", ["advance_stop"], tracker=False)
     )
     assert not without.context.stopped

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import inputs_of
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.override import OverrideTest
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.slips import OverrideTest
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 

@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
 from gcode2krl.effects import Applied, library, simulate
-from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
-from gcode2krl.gap.beside.pair import usable_rows
+from gcode2krl.gap.compare.pair import usable_rows, with_nominal_joints, with_own_model
 from gcode2krl.runs import Force, RunHead, Tracker
 from tests.gap.constructed import controller, joints, motion, pair, stub
 

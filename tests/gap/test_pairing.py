@@ -8,8 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
-from gcode2krl.gap.beside.log_alone import log_pairs
-from gcode2krl.gap.beside.pairing import first_start, hours_since, pairs_of
+from gcode2krl.gap.compare.pair import first_start, hours_since, log_pairs, pairs_of
 from gcode2krl.runs import Force, RunHead
 from tests.gap.constructed import cell, controller, joints, pair
 from tests.gap.test_planning import prediction

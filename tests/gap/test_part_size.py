@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.links import FORCE, GEAR, MECHANICS, PART, PATH, SERVO
-from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.judged import Cause, Judged, Judgement
-from gcode2krl.gap.slips.slip import Slip
-from gcode2krl.gap.tell.part_size import at_part, at_part_of, run_sizes
-from gcode2krl.gap.tell.residuals import Residual
+from gcode2krl.gap.answer.evidence import Residual
+from gcode2krl.gap.answer.where import at_part, at_part_of, run_sizes
+from gcode2krl.gap.compare.links import FORCE, GEAR, MECHANICS, PART, PATH, SERVO
+from gcode2krl.gap.compare.slips import Slip
+from gcode2krl.gap.posterior.examination import Size
+from gcode2krl.gap.posterior.judgement import Cause, Judged, Judgement
 from tests.gap.constructed import motion, trace
 from tests.gap.synthetic import applied
 

@@ -8,8 +8,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.tell.abscissa import Against
-from gcode2krl.gap.tell.html.pictures import (
+from gcode2krl.gap.answer.evidence import Against
+from gcode2krl.gap.answer.page import (
     draw_dependence,
     draw_path,
     draw_time,
@@ -20,7 +20,7 @@ from gcode2krl.gap.tell.html.pictures import (
     views_of,
     write_pictures,
 )
-from gcode2krl.gap.tell.result import Where
+from gcode2krl.gap.answer.result import Where
 from tests.gap.answered import GAP, STRETCH, TIME_S, evidence, run_evidence
 
 DRAWN = replace(GAP, evidence=evidence(), where=Where(intervals=(STRETCH,)))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Parameter
-from gcode2krl.gap.fit.place_times import PlaceTimes, gone
+from gcode2krl.gap.compare.clocks import gone
+from gcode2krl.gap.posterior.examination import PlaceTimes
 from tests.gap.constructed import Added, Impossible, applied, joints, motion, trace
 
 

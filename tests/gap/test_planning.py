@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.fine_prediction import refined_prediction
-from gcode2krl.gap.beside.interpolation import cubic
-from gcode2krl.gap.beside.planning import remembered_plan
+from gcode2krl.gap.compare.interpolation import cubic
+from gcode2krl.gap.compare.pair import refined_prediction, remembered_plan
 from gcode2krl.prediction import Prediction
 
 STEP_S = 0.004

@@ -8,11 +8,10 @@ import pytest
 from gcode2krl import load_cell, robot
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gap import diagnose_log
-from gcode2krl.gap.beside.links import MECHANICS
-from gcode2krl.gap.beside.log_alone import log_pairs
-from gcode2krl.gap.beside.poses import is_of_poses
-from gcode2krl.gap.fit.pose_noise import noise_of_poses, revisits
-from gcode2krl.gap.tell.first_sentence import headline
+from gcode2krl.gap.answer.words import headline
+from gcode2krl.gap.compare.links import MECHANICS
+from gcode2krl.gap.compare.pair import is_of_poses, log_pairs
+from gcode2krl.gap.noise.source import noise_of_poses, revisits
 from gcode2krl.runs import load_run
 from tests.plant import pose_arms
 

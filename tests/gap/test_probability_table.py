@@ -2,12 +2,11 @@
 
 import json
 
-from gcode2krl.gap.choose.probability_table import TABLE, declared_nats, stated_table
-from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.gap.thresholds import TABLE, THRESHOLDS, declared_nats, stated_table
 
 
 def test_the_table_stands_beside_the_thresholds():
-    assert TABLE.parent.name == "thresholds"
+    assert TABLE.is_file()
     assert stated_table() == json.loads(TABLE.read_text(encoding="utf-8"))
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.pulses import pulse_rows
-from gcode2krl.gap.fit.noise import Noise, Slow, drawn_noise
+from gcode2krl.gap.compare.events import pulse_rows
+from gcode2krl.gap.noise.short import Noise, Slow, drawn_noise
 
 SECONDS = 15.0
 STATED = 0.01

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Effect, Parameter, Role
-from gcode2krl.gap.choose.examination import Examination, LinkData
-from gcode2krl.gap.choose.ranking import ranked, shortlist
-from gcode2krl.gap.choose.scoring import threshold
-from gcode2krl.gap.fit.design import Candidates, nuisance_for
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import Candidates, nuisance_for
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.examination import Examination, LinkData
+from gcode2krl.gap.posterior.likelihood import refit
+from gcode2krl.gap.posterior.selection import ranked, shortlist, threshold
 from tests.gap.constructed import STEP_S, question, trace, wave
 
 COUNT = 500
@@ -72,7 +71,7 @@ class Tone(Effect):
 
 def test_what_is_searched_is_judged_by_its_scatter_after_the_refit(monkeypatch):
     """A frequency a little off leaves as much, where a tone is strongest, as scatter would."""
-    monkeypatch.setattr("gcode2krl.gap.fit.gram.Gram.inflation", lambda gram, columns: 1e3)
+    monkeypatch.setattr("gcode2krl.gap.posterior.gram.Gram.inflation", lambda gram, columns: 1e3)
     found = examination(0.5, 0.0, 0.0)
     assert scores_of(found) == []
     for effect in WAVES:

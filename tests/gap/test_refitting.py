@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import least_squares, lsq_linear
 
 from gcode2krl.effects import Applied, Parameter, library
-from gcode2krl.gap.choose.selection import nuisance_for
-from gcode2krl.gap.fit.refitting import refit, searched
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import nuisance_for
+from gcode2krl.gap.posterior.likelihood import refit, searched
 from tests.gap.constructed import (
     Added,
     Impossible,

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.replanning import replanned
-from gcode2krl.gap.fit.place_times import PlaceTimes
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.signatures import Block
+from gcode2krl.gap.components import Block
+from gcode2krl.gap.posterior.examination import PlaceTimes
+from gcode2krl.gap.posterior.likelihood import refit
+from gcode2krl.gap.posterior.selection import replanned
 from tests.gap.constructed import applied, likelihood
 from tests.gap.test_place_times import SLOWER, run
 

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.tell.first_sentence import headline
-from gcode2krl.gap.tell.report import left_lines, text_report, where_words, worst
-from gcode2krl.gap.tell.result import EffectAt, EventResult, Expectation, NextRun, RunSize, Separates, Where
+from gcode2krl.gap.answer.result import EffectAt, EventResult, Expectation, NextRun, RunSize, Separates, Where
+from gcode2krl.gap.answer.words import headline, left_lines, text_report, where_words, worst
 from tests.gap.answered import BACKLASH, GAP, STRETCH, UNEXPLAINED, UNSURE
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.tell.residuals import residuals_of, rms_length, smoothed
+from gcode2krl.gap.answer.evidence import residuals_of, rms_length, smoothed
+from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 SIGMA = 1e-4

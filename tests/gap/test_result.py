@@ -4,8 +4,8 @@ from dataclasses import FrozenInstanceError, fields, is_dataclass
 
 import pytest
 
-from gcode2krl.gap.choose.judged import NAMED
-from gcode2krl.gap.tell import result
+from gcode2krl.gap.answer import result
+from gcode2krl.gap.posterior.judgement import NAMED
 
 
 def _cause(probability):

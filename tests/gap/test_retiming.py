@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.links import PATH
-from gcode2krl.gap.beside.retiming import refined, retimed
+from gcode2krl.gap.compare.clocks import refined, retimed
+from gcode2krl.gap.compare.links import PATH
 from tests.gap.constructed import controller, joints, motion, pair
 
 INPUTS = motion()

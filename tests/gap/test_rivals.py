@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.probability_table import declared_nats
-from gcode2krl.gap.choose.rivals import Rival, rival_probabilities, rivals_of
-from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals_of
+from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 from tests.gap.constructed import Added, applied, examined, motion, noise, trace, wave
 
 LIMITS = THRESHOLDS.choose

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import PART
-from gcode2krl.gap.beside.pairing import pairs_of
-from gcode2krl.gap.choose.surface import judge_surface
+from gcode2krl.gap.compare.links import PART
+from gcode2krl.gap.compare.pair import pairs_of
+from gcode2krl.gap.compare.trace import Context
 from gcode2krl.gap.diagnosis import known_effects
+from gcode2krl.gap.posterior.geometry import judge_surface
 from gcode2krl.runs.scan import Scan
 from tests.gap.synthetic import prediction, refined, runs
 

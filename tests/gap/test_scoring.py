@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import optimize, special, stats
 
-from gcode2krl.gap.choose.scoring import scores, surprise, threshold
-from gcode2krl.gap.fit.design import Column
+from gcode2krl.gap.noise.nuisance import Column
+from gcode2krl.gap.posterior.selection import scores, surprise, threshold
 from tests.gap.constructed import gram, noise, trace
 
 COUNT = 300

@@ -5,12 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.scoring import scores, surprise, threshold
-from gcode2krl.gap.fit.design import Column
-from gcode2krl.gap.fit.gram import SignatureGram
-from gcode2krl.gap.fit.likelihood import Likelihood
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.nuisance import Nuisance
+from gcode2krl.gap.noise.nuisance import Column, Nuisance
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.gram import SignatureGram
+from gcode2krl.gap.posterior.likelihood import Likelihood
+from gcode2krl.gap.posterior.selection import scores, surprise, threshold
 
 COUNT, BLOCKS, STRETCHES = 2400, 25, 48
 

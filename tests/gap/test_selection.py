@@ -7,11 +7,10 @@ import pytest
 
 from gcode2krl.effects import library
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.mismatch import within_mismatch
-from gcode2krl.gap.choose.selection import examine
-from gcode2krl.gap.fit.design import NuisanceDesign, nuisance_for
-from gcode2krl.gap.fit.noise import white
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import NuisanceDesign, nuisance_for
+from gcode2krl.gap.noise.short import white
+from gcode2krl.gap.posterior.selection import examine, within_mismatch
 from tests.gap.constructed import (
     Added,
     Impossible,

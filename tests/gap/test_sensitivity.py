@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.sensitivity import sensitivity_of
+from gcode2krl.gap.posterior.likelihood import refit, sensitivity_of
 from tests.gap.constructed import Added, applied, likelihood, motion, noise, trace, wave
 
 SIGMA = 0.4

@@ -9,11 +9,11 @@ import pytest
 from gcode2krl.canned.trial import trials_of
 from gcode2krl.effects import Applied, library, simulate
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.choose.separation import Bench, allowed_by, information_of
-from gcode2krl.gap.fit.design import Question
-from gcode2krl.gap.fit.numbers import free_of
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.signatures import blocks_of
+from gcode2krl.gap.components import blocks_of
+from gcode2krl.gap.noise.nuisance import Question
+from gcode2krl.gap.posterior.least_squares import free_of
+from gcode2krl.gap.posterior.likelihood import refit
+from gcode2krl.gap.posterior.next_run import Bench, allowed_by, information_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import cell, examined, noise, trace
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.choose.set_clocks import with_set_clocks
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.posterior.judgement import with_set_clocks
 from tests.gap.constructed import motion, noise, question, trace
 
 NOTHING = question([])

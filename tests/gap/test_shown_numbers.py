@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Effect, Parameter, Role
-from gcode2krl.gap.choose.intervals import intervals_of
-from gcode2krl.gap.choose.shown_numbers import with_shown_numbers
-from gcode2krl.gap.fit.numbers import free_of
-from gcode2krl.gap.fit.refitting import refit
-from gcode2krl.gap.fit.signatures import blocks_at
+from gcode2krl.gap.components import blocks_at
+from gcode2krl.gap.posterior.cause_tests import intervals_of
+from gcode2krl.gap.posterior.least_squares import free_of
+from gcode2krl.gap.posterior.likelihood import refit
+from gcode2krl.gap.posterior.selection import with_shown_numbers
 from tests.gap.constructed import applied, examined, motion, noise, trace
 
 TIME_S = motion().time_s

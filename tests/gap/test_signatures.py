@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import library
-from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_of, strongest_hz
+from gcode2krl.gap.components import Block, Signatures, blocks_of, strongest_hz
 from tests.gap.constructed import Added, Impossible, joints, trace
 
 LIBRARY = library()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.beside.simulator import Simulator
+from gcode2krl.gap.compare.pair import Simulator
 from tests.gap.constructed import Added, applied, motion
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.errors import input_error
-from gcode2krl.gap.beside.links import FORCE
-from gcode2krl.gap.slips.slip import best_of, rms, rms_before, rms_left, slip_if_explained
+from gcode2krl.gap.compare.links import FORCE
+from gcode2krl.gap.compare.slips import best_of, rms, rms_before, rms_left, slip_if_explained
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import applied
 

@@ -7,12 +7,10 @@ import pytest
 
 from gcode2krl.effects import inputs_of, simulate
 from gcode2krl.effects.frame_effect import frame_of
-from gcode2krl.gap.beside.commanded import commanded_path, on_the_curve
-from gcode2krl.gap.beside.interpolation import cubic
-from gcode2krl.gap.beside.own_model import with_nominal_joints, with_own_model
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.order import first_slip
-from gcode2krl.gap.slips.program import other_program
+from gcode2krl.gap.compare.interpolation import cubic
+from gcode2krl.gap.compare.pair import Pair, with_nominal_joints, with_own_model
+from gcode2krl.gap.compare.slips import commanded_path, on_the_curve, other_program
+from gcode2krl.gap.posterior.set_up import first_slip
 from gcode2krl.runs import Controller, Run
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.fit.noise import Slow, drawn_slow
-from gcode2krl.gap.fit.slow_noise import BlockMeans, slow_parts_of
+from gcode2krl.gap.noise.short import Slow, drawn_slow
+from gcode2krl.gap.noise.slow import BlockMeans, slow_parts_of
 
 pytestmark = pytest.mark.slow
 

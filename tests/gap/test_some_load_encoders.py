@@ -10,10 +10,10 @@ from gcode2krl import robot
 from gcode2krl.effects import Applied, library, simulate
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap import diagnose_log
-from gcode2krl.gap.beside.context import Context, unmeasured_at
-from gcode2krl.gap.choose.candidates import question_of
-from gcode2krl.gap.fit.nuisance import nuisance_of
-from gcode2krl.gap.fit.signatures import Signatures
+from gcode2krl.gap.compare.trace import Context, unmeasured_at
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import nuisance_of
+from gcode2krl.gap.posterior.examination import question_of
 from gcode2krl.runs import Run, RunHead, Tracker
 from tests.gap.constructed import LINK, cell, controller, joints, motion, noise, trace
 

@@ -10,11 +10,10 @@ import pytest
 
 from gcode2krl.effects import Effect, Mismatch, Parameter, Role
 from gcode2krl.effects.mismatch import sigma
-from gcode2krl.gap.beside.instruments import CLOCK
-from gcode2krl.gap.beside.links import SERVO
-from gcode2krl.gap.fit.nuisance import nuisance_of
-from gcode2krl.gap.fit.numbers import free_of
-from gcode2krl.gap.fit.signatures import Block, Signatures, blocks_at, blocks_of
+from gcode2krl.gap.compare.links import CLOCK, SERVO
+from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_of
+from gcode2krl.gap.noise.nuisance import nuisance_of
+from gcode2krl.gap.posterior.least_squares import free_of
 
 TIME_S = np.linspace(0.0, 2.0, 201)
 

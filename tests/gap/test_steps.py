@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.effects.dependence import Where
-from gcode2krl.gap.families.grid import Place
-from gcode2krl.gap.families.rows import Rows
-from gcode2krl.gap.families.steps import Steps
+from gcode2krl.gap.components import Place
+from gcode2krl.gap.posterior.families import Rows
+from gcode2krl.gap.posterior.study import Steps
 from tests.gap import constructed as c
 
 

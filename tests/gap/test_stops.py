@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.beside.pairing import pairs_of
+from gcode2krl.gap.compare.clocks import gone
+from gcode2krl.gap.compare.pair import pairs_of
+from gcode2krl.gap.compare.slips import unplanned_stops
 from gcode2krl.gap.diagnosis import known_effects
-from gcode2krl.gap.fit.place_times import gone
-from gcode2krl.gap.slips.stops import unplanned_stops
 from tests.gap.synthetic import applied, refined, runs
 
 pytestmark = pytest.mark.slow

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import pytest
 
 from gcode2krl.effects.mismatch import Mismatch
-from gcode2krl.gap.beside.context import Context
-from gcode2krl.gap.beside.links import MECHANICS, PART
-from gcode2krl.gap.choose import surface
-from gcode2krl.gap.choose.gap_size import Size
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.choose.judged import Judged
-from gcode2krl.gap.tell.assembly import answer
+from gcode2krl.gap.answer.assembly import answer
+from gcode2krl.gap.compare.links import MECHANICS, PART
+from gcode2krl.gap.compare.trace import Context
+from gcode2krl.gap.posterior import geometry
+from gcode2krl.gap.posterior.cause_tests import Interval
+from gcode2krl.gap.posterior.examination import Size
+from gcode2krl.gap.posterior.judgement import Judged
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import LIBRARY, applied
 
@@ -24,8 +24,8 @@ def _context(*judgements):
 
 
 def _judged(shrink, is_gap=True, *earlier):
-    found = surface._Finding(LARGER, Interval(0.2, 0.18, 0.22), is_gap, 500, 0.01, 1e-4, shrink)
-    return surface._judgement(PART, found, _context(*earlier))
+    found = geometry._Finding(LARGER, Interval(0.2, 0.18, 0.22), is_gap, 500, 0.01, 1e-4, shrink)
+    return geometry._judgement(PART, found, _context(*earlier))
 
 
 def _earlier(verdict, named=()):

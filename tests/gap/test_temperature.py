@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.beside.temperature import temperature_at
-from gcode2krl.gap.families.grid import Grid
+from gcode2krl.gap.compare.pair import temperature_at
+from gcode2krl.gap.components import Grid
 from gcode2krl.runs import Controller
 from tests.gap.constructed import motion, noise, trace
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.beside.timing import late_s, residual_by_place, timing_share, timing_sizes
+from gcode2krl.gap.compare.clocks import late_s, residual_by_place, timing_share, timing_sizes
 from tests.gap.constructed import joint_rates, joints, trace
 
 NOMINAL = trace(np.zeros((500, 6)), "path")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.families.tone_search import angle_tones, tones
+from gcode2krl.gap.posterior.study import angle_tones, tones
 from tests.gap import constructed as c
 from tests.gap.test_families import view_of
 

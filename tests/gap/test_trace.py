@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.beside.trace import Trace
+from gcode2krl.gap.compare.trace import Trace
 from tests.gap.constructed import applied, joint_rates, joints, motion, trace, wave
 
 LIBRARY = library()

@@ -7,8 +7,8 @@ import pytest
 
 from gcode2krl.effects import inputs_of
 from gcode2krl.effects.frame_effect import frame_of
-from gcode2krl.gap.beside.pair import Pair
-from gcode2krl.gap.slips.tracker_frame import TrackerFrameTest
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.posterior.set_up import TrackerFrameTest
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, Parameter
-from gcode2krl.gap.choose.judgement import judge
-from gcode2krl.gap.choose.rivals import rivals_of
-from gcode2krl.gap.choose.selection import with_rival
-from gcode2krl.gap.choose.twins import twins_of
+from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.posterior.selection import rivals_of, twins_of, with_rival
 from tests.gap import constructed as c
 
 SIGMA = 1e-4

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gcode2krl.gap.beside.verdict import is_lost
+from gcode2krl.gap.compare.trace import is_lost
 from tests.gap.constructed import stub
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from gcode2krl.gap.families.view import View
-from gcode2krl.gap.fit.box import MOST
-from gcode2krl.gap.fit.split_columns import SplitColumns
+from gcode2krl.gap.posterior.families import View
+from gcode2krl.gap.posterior.gram import MOST, SplitColumns
 from tests.gap.constructed import split
 
 COUNT = 300

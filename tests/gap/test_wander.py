@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.effects.dependence import Dependence
-from gcode2krl.gap.choose.family_tests import LinkFamilies
-from gcode2krl.gap.choose.wander import is_wander
+from gcode2krl.gap.posterior.cause_tests import LinkFamilies
+from gcode2krl.gap.posterior.judgement import is_wander
 from tests.gap.constructed import examined, motion, noise, trace, wave
 
 COUNT, RUNS = 1000, 3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Applied, library
-from gcode2krl.gap.tell.where import PHASES, over_noise, phase_of, place
+from gcode2krl.gap.answer.where import PHASES, over_noise, phase_of, place
 from tests.gap.constructed import AMPLITUDE_RAD, HZ, applied, motion, trace, wave
 
 TIME_S = motion().time_s

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.choose.intervals import Interval
-from gcode2krl.gap.tell.result import Constancy, Course, EffectAt, Expectation, NextRun, Separates, UnknownAt
-from gcode2krl.gap.tell.words import (
+from gcode2krl.gap.answer.result import Course, EffectAt, Expectation, NextRun, Separates, UnknownAt
+from gcode2krl.gap.answer.words import (
     alike,
     depends,
     describe,
@@ -19,6 +18,7 @@ from gcode2krl.gap.tell.words import (
     unit_of,
     what_there_is,
 )
+from gcode2krl.gap.posterior.cause_tests import Constancy, Interval
 from tests.gap.answered import BACKLASH, STEP
 
 

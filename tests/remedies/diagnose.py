@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 
 from gcode2krl import Prediction, load_cell
-from gcode2krl.gap.slips.air import without_cuts
-from gcode2krl.gap.tell.instruments import issues_of
+from gcode2krl.gap.answer.causes import issues_of
+from gcode2krl.gap.compare.slips import without_cuts
 from gcode2krl.runs.scan import read_scan
 from tests.gap.test_air import _pair
 from tests.gap.test_instruments import SIGMA, judgement, rough

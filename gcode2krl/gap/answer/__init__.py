@@ -1,0 +1,1 @@
+"""The answer: typed, in words, as JSON, into a cell file, as pictures."""

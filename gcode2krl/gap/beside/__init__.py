@@ -1,1 +1,0 @@
-"""Prediction and run brought together: pairs, traces, links, clocks, splits."""

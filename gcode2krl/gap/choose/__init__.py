@@ -1,1 +1,0 @@
-"""Which effects are at work, how sure, and how much they explain."""

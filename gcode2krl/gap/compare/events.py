@@ -1,0 +1,621 @@
+"""Events: what is rough or far off for a moment, and whose it is before anything is left out.
+
+An encoder does not burst in step with the command, nor at the same places in every run, nor together with the
+tracker, and it leaves nothing behind. So what is rough is compared with where the command changes (jerk,
+reversals, jumps of the predicted force), with repeats of the program, with the other tables and with the
+level before and after it:
+
+- in step with the command, or at the same place in all repeats: structure, and it stays.
+- with a change that stays behind it: something slipped, which is told. It stays where it is
+  that change alone. Where another table is rough at the same moment it is a gap: instruments do not slip
+  together.
+- a pulse, or rough in two tables at once: an impulse of the machine. Its rows are a model of their
+  own, so the rest is judged without them; it is told with moment, size and width, and is a gap.
+- else the instrument's: a burst. It is left out, and that is told. Of a tracker or a force sensor that has
+  three of these a pulse is one more.
+
+"In step" is a binomial test: of k events at least so many fall into a share f of the time by chance.
+
+**Bursts and outliers.** Fourth differences of measured less model have nothing of drifts, effects and
+vibration of some tens of hertz, and of a jump a few rows only; in a burst their median over a tenth of a
+second rises. A single row far from its neighbours, which agree with each other, is an outlier. A component of
+which more than a small part would go has neither: that is then how the instrument, or what it sees, is.
+
+**Pulses.** For a moment a signal is far from where it was and will be, several rows together: the median of
+some neighbouring rows less the median of what surrounds them. It is compared with the same all over the run,
+whatever the colour of the noise, and with how rough the signal is around it: single rows of heavy tails move
+no median, and in a burst of the instrument every median moves.
+
+**Hum of the mains.** Tones at multiples of 50 or 60 Hz, folded by the sampling. The grid keeps its frequency
+to some tens of millihertz, whatever the robot does; nothing of a robot or of a cut is bound to it but a
+spindle that turns at that speed, and then nothing is taken off.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.effects import Inputs
+from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.compare.interpolation import Bands, linear, resolution, usual_deviation
+from gcode2krl.gap.compare.trace import Event, Span, Trace, Whose, with_rows
+from gcode2krl.gap.thresholds import THRESHOLDS
+from gcode2krl.units import RAD_PER_REV
+
+_LIMITS = THRESHOLDS.beside
+_WEIGHTS = (1.0, -4.0, 6.0, -4.0, 1.0)
+_LEAST_WINDOW = 9
+"""Rows, so that the differences around one jump are fewer than half of a window."""
+_LEAST_SCALE = 1e-12
+
+
+def loud_rows(time_s: Floats, values: Floats, segments: Ints, model: Floats | None = None) -> Bools:
+    """Return which rows (n,) of values (n, k) are in a burst or outliers, in any component.
+
+    Rows stay at which the ``model`` (n, k) itself is as rough as the values usually are: what is left there
+    is the model's.
+    """
+    loud = np.zeros(len(values), dtype=bool)
+    if len(values) < 2 * _LEAST_WINDOW:
+        return loud
+    window = max(_LEAST_WINDOW, round(_LIMITS.burst_s / float(np.median(np.diff(time_s))))) | 1
+    for j, column in enumerate(values.T):
+        rough = np.abs(_fourth_differences(column, segments))
+        usual = float(np.median(rough[np.isfinite(rough)])) if np.isfinite(rough).any() else 0.0
+        if usual <= _LEAST_SCALE:  # the last decimal, or nothing, moves
+            continue
+        rows = _widened(_local(rough, usual, window) > _LIMITS.burst_times * usual, window // 2)
+        rows |= _outliers(column, segments, usual)
+        if model is not None:
+            rows &= ~_widened(np.abs(_fourth_differences(model[:, j], segments)) > usual, window)
+        if np.mean(rows) <= _LIMITS.bursts_most:
+            loud |= rows
+    return loud
+
+
+def _local(rough: Floats, usual: float, window: int) -> Floats:
+    """Return the median (n,) of a roughness around each row."""
+    from scipy.ndimage import median_filter
+
+    local: Floats = median_filter(np.where(np.isfinite(rough), rough, usual), size=window, mode="nearest")
+    return local
+
+
+def _fourth_differences(values: Floats, segments: Ints) -> Floats:
+    """Return fourth differences (n,) around each row; not a number at two rows at each end of a segment."""
+    found = np.full(len(values), np.nan)
+    for first, last in segments:
+        if last - first >= len(_WEIGHTS):
+            found[first + 2 : last - 2] = np.convolve(values[first:last], _WEIGHTS, mode="valid")
+    return found
+
+
+def _outliers(values: Floats, segments: Ints, usual: float) -> Bools:
+    """Return which rows (n,) are far from both neighbours, which agree with each other."""
+    far = np.zeros(len(values), dtype=bool)
+    for first, last in segments:
+        x = values[first:last]
+        if len(x) < 3:
+            continue
+        beside = 0.5 * (x[:-2] + x[2:])
+        off = np.abs(x[1:-1] - beside)
+        # of normal values the median fourth difference is 5.6 deviations
+        least = _LIMITS.outlier_deviations * usual / 5.6
+        far[first + 1 : last - 1] = (off > least) & (np.abs(x[2:] - x[:-2]) < 0.5 * off)
+    return far
+
+
+def _widened(rows: Bools, by: int) -> Bools:
+    """Return rows (n,) with this many on either side."""
+    widened: Bools = np.convolve(rows, np.ones(2 * by + 1), mode="same") > 0.5
+    return widened
+
+
+_LEAST_PULSE_ROWS = 5
+"""Of which the median is taken: of three rows heavy tails move it."""
+_FOURTH = (1.0, -4.0, 6.0, -4.0, 1.0)
+_OF_HEIGHT = 0.25
+"""Rows that are off by less of a pulse's height are beside it."""
+
+
+def pulse_rows(time_s: Floats, values: Floats, segments: Ints, least: Floats) -> Bools:
+    """Return which rows (n,) of values (n, k) are in a pulse of any component.
+
+    ``least`` (k,): rms of rounding to the last decimal. A component with many pulses has none: so it is.
+    """
+    pulsed = np.zeros(len(values), dtype=np.bool_)
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    around = max(_rows(_LIMITS.pulse_around_s, step_s), 4 * _LEAST_PULSE_ROWS + 1)
+    for column, smallest in zip(values.T, least.tolist(), strict=True):
+        own = np.zeros(len(values), dtype=np.bool_)
+        for first, last in segments:
+            if last - first > around:
+                own[first:last] = _of_column(column[first:last], step_s, around, smallest)
+        if np.mean(own) <= _LIMITS.bursts_most:
+            pulsed |= own
+    return pulsed
+
+
+def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bools:
+    from scipy.ndimage import maximum_filter1d, median_filter
+
+    left: Floats = values - median_filter(values, size=around, mode="nearest")
+    pulsed = np.zeros(len(values), dtype=np.bool_)
+    for width_s in _LIMITS.pulse_widths_s:
+        width = max(_rows(width_s, step_s), _LEAST_PULSE_ROWS)
+        middle = median_filter(left, size=width, mode="nearest")
+        usual = max(usual_deviation(middle), least)
+        if usual > 0.0:
+            rough = _roughness(left, 2 * width + 1)
+            far = np.abs(middle) > _LIMITS.pulse_deviations * usual * rough
+            height = maximum_filter1d(np.where(far, np.abs(middle), 0.0), width)
+            pulsed |= (height > 0.0) & (np.abs(left) > _OF_HEIGHT * height)
+    return pulsed
+
+
+def _roughness(values: Floats, around: int) -> Floats:
+    """Return how rough the surroundings of each row (n,) are, over how rough the run usually is; at least 1.
+
+    By the median of fourth differences: a pulse has rough edges, a burst is rough all along.
+    """
+    from scipy.ndimage import median_filter
+
+    rough = np.abs(np.convolve(values, _FOURTH, mode="same"))
+    local: Floats = median_filter(rough, size=around, mode="nearest")
+    return np.maximum(local / max(float(np.median(rough)), 1e-300), 1.0)
+
+
+def _rows(seconds: float, step_s: float) -> int:
+    """Return an odd number of rows that last about so long."""
+    return 2 * round(seconds / step_s / 2.0) + 1
+
+
+_GRIDS_HZ = (50.0, 60.0)
+_MULTIPLES = (1, 2, 3, 5)
+"""Of a grid: transformers give the second, rectifiers and cores odd ones."""
+_TEETH = 12
+"""A cutter has no more: so many multiples of the spindle's speed may be in a force."""
+_GAP, _BESIDE = 0.2, 40
+"""Share of the surroundings that a tone may fill, and how many frequencies on either side are asked."""
+_MEDIAN = float(np.log(2.0))
+"""Power of noise is distributed exponentially: its median over its mean."""
+
+
+def without_hum(traces: Sequence[Trace]) -> list[Trace]:
+    """Return traces less the tones of the mains in them, each component and run by itself."""
+    return [_without(trace) for trace in traces]
+
+
+def _without(trace: Trace) -> Trace:
+    count = len(trace.time_s)
+    if trace.still or not trace.link.has_instrument or count < _LIMITS.hum_least_rows:
+        return trace
+    step_s = float(np.median(np.diff(trace.time_s)))
+    measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])
+    # what is folded to a drift is none to be told
+    told = (hz for hz in _mains_hz(trace) if 4.0 * _LIMITS.hum_around_hz < _folded(hz, step_s))
+    found = [hz for hz in told if spectrum.take_off(measured, trace.nominal, hz)]
+    if not found:
+        return trace
+    hum = f"hum of the mains at {', '.join(f'{hz:g}' for hz in found)} Hz"
+    return replace(trace, measured=measured, left_out=(*trace.left_out, hum))
+
+
+def _mains_hz(trace: Trace) -> list[float]:
+    """Return the frequencies of the mains that no spindle of the run has."""
+    speeds = np.unique(np.round(np.abs(trace.inputs.spindle_rad_s) / RAD_PER_REV, 2))
+    turning = np.outer(speeds[speeds > 0.0], np.arange(1, _TEETH + 1)).ravel()
+    mains = [grid * multiple for grid in _GRIDS_HZ for multiple in _MULTIPLES]
+    return [hz for hz in mains if not np.any(np.abs(turning - hz) < _LIMITS.hum_beside_hz)]
+
+
+def _folded(hz: float, step_s: float) -> float:
+    """Return the frequency at which a tone shows in samples."""
+    turns = hz * step_s % 1.0
+    return min(turns, 1.0 - turns) / step_s
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """The spectrum of one trace around frequencies of the mains."""
+
+    near: Bands
+    """Where a tone of the mains may be."""
+    around: Bands
+    """What is beside it, below as well as above."""
+
+    @classmethod
+    def of(cls, time_s: Floats) -> "_Spectrum":
+        step_hz = 0.1 / float(time_s[-1])
+        count = int(2.0 * _LIMITS.hum_wander_hz / step_hz + 1e-6) + 1
+        reach_hz = (1.0 - _GAP) * _LIMITS.hum_around_hz
+        return cls(Bands(time_s, step_hz, count), Bands(time_s, reach_hz / (_BESIDE - 1), _BESIDE))
+
+    def level(self, hz: float, values: Floats) -> Floats:
+        """Return the mean power (k,) of noise beside a frequency."""
+        starts = (hz - _LIMITS.hum_around_hz, hz + _GAP * _LIMITS.hum_around_hz)
+        around = np.concatenate([self.around.power(start, values) for start in starts])
+        level: Floats = np.median(around, axis=0) / _MEDIAN
+        return level
+
+    def take_off(self, measured: Floats, nominal: Floats, hz: float) -> bool:
+        """Take a tone off the columns (n, k) in which it stands out; tell whether there are any."""
+        rests = measured - nominal
+        rests -= rests.mean(axis=0)
+        first_hz = hz - _LIMITS.hum_wander_hz
+        powers = self.near.power(first_hz, rests)
+        stands_out = powers.max(axis=0) > self.level(hz, rests) * np.log(len(powers) / _LIMITS.hum_false)
+        for j in np.flatnonzero(stands_out):
+            angle = 2.0 * np.pi * self.near.hz(first_hz)[int(np.argmax(powers[:, j]))] * self.near.time_s
+            tone = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            measured[:, j] -= tone @ np.linalg.lstsq(tone, rests[:, j], rcond=None)[0]
+        return bool(stands_out.any())
+
+
+_JERK_STEP_S = 0.012
+"""Over which the commanded acceleration is differenced: a cycle of the interpolator."""
+_LEVELS = 200
+"""Places of a run at which the level before and after is compared."""
+_OUTLIER_ROWS = 2
+"""So few rows that are no pulse are an outlier, which needs no moment."""
+_LEAST_ROWS = 60
+_MOST_FITTED = 4000
+"""Rows of a run from which is learnt what follows the motion; the time that takes does not grow with it."""
+_MOMENT_S = 0.1
+"""Over which changes of the rest are compared with those of the motion."""
+_FAR, _RIDGE = 6.0, 1e-6
+"""Robust deviations beyond which a row does not tell what follows the motion; columns of unit mean square."""
+_SAME_MM = 1e-3
+"""Repeats of a program have the same path."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Rough rows of a trace that belong together."""
+
+    first: int
+    last: int
+    is_pulse: bool
+
+
+def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]]) -> list[Trace]:
+    """Return traces of all runs with their events, less the rows of impulses and of instruments' bursts.
+
+    ``elsewhere``: of each run the times at which other tables are rough (`rough_spans`).
+    """
+    rests = [_rest(trace) for trace in traces]
+    stretches = [list(_stretches(trace, rest)) for trace, rest in zip(traces, rests, strict=True)]
+    if not any(stretches):
+        return list(traces)
+    commanded = _in_step(traces, stretches, [command_changes(trace) for trace in traces])
+    repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
+    shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
+    coincident = _in_step(traces, stretches, shared, least=1)
+    found = [
+        _sorted(_Levels(trace, rest), own, [a or b for a, b in zip(command, again, strict=True)], both)
+        for trace, rest, own, command, again, both in zip(
+            traces, rests, stretches, commanded, repeated, coincident, strict=True
+        )
+    ]
+    return [_of_a_bursty_instrument(trace) for trace in found] if _is_bursty(found) else found
+
+
+def line_at(inputs: Inputs, at_s: float) -> int:
+    """Return the G-code line that the robot is on at a time of its run."""
+    row = min(max(int(np.searchsorted(inputs.time_s, at_s)) - 1, 0), len(inputs) - 1)
+    return int(inputs.source_line[row])
+
+
+def rough_spans(traces: Sequence[Trace]) -> dict[str, list[Span]]:
+    """Return of each run the times at which a signal is rough or in a pulse, outliers apart."""
+    spans: dict[str, list[Span]] = {}
+    for trace in traces:
+        kept = [each for each in _stretches(trace, _rest(trace)) if not _is_outlier(each)]
+        spans.setdefault(trace.run, []).extend(_span(trace, each) for each in kept)
+    return spans
+
+
+# What is rough
+
+
+def _is_asked(trace: Trace) -> bool:
+    """Tell whether a trace has events: what is commanded has no instrument, and poses have no time."""
+    return trace.link.has_instrument and not trace.still and len(trace.time_s) >= _LEAST_ROWS
+
+
+def _rest(trace: Trace) -> Floats:
+    """Return what is left (n, k) of a trace beside all that follows its motion and its force.
+
+    A clock that is off, a lag or a play make pulses and steps, too: in step with the command, whatever else.
+    """
+    if not _is_asked(trace):
+        return trace.residual
+    inputs, rest = Admissible(trace), trace.residual.copy()
+    shared = np.column_stack(
+        [
+            *(inputs.position_mm, inputs.q_rad, inputs.rate_rad_s, inputs.acceleration_rad_s2),
+            *(inputs.velocity_mm_s, inputs.acceleration_mm_s2, inputs.directions, inputs.force_N),
+        ]
+    )
+    # by what changes within moments: a step of the rest is then a few rows that are far off
+    now = np.arange(0, len(rest), max(1, len(rest) // _MOST_FITTED))
+    later = np.minimum(np.searchsorted(trace.time_s, trace.time_s[now] + _MOMENT_S), len(rest) - 1)
+    for j, column in enumerate(trace.columns):
+        own = inputs.tool_axes[:, column % 3]
+        if trace.link.of_tip:
+            own = inputs.jacobian[:, column] * inputs.directions
+        columns = np.column_stack([shared, own])
+        changes = columns[later] - columns[now]
+        scale = np.sqrt(np.mean(changes**2, axis=0))
+        used = scale > 1e-9 * np.maximum(np.abs(columns).max(axis=0), 1e-12)
+        weights = _fitted(changes[:, used] / scale[used], rest[later, j] - rest[now, j])
+        rest[:, j] -= columns[:, used] @ (weights / scale[used])
+    return rest
+
+
+def _fitted(columns: Floats, values: Floats) -> Floats:
+    """Return the weights (c,) of columns for values (n,), those far off what they give left out."""
+    weights: Floats = np.zeros(columns.shape[1])
+    for _ in range(2):
+        off = values - columns @ weights - np.median(values - columns @ weights)
+        near = np.abs(off) <= _FAR * max(usual_deviation(off), 1e-12)
+        x = columns[near]
+        gram = x.T @ x + _RIDGE * len(x) * np.eye(x.shape[1])
+        weights = np.asarray(np.linalg.solve(gram, x.T @ values[near]), dtype=np.float64)
+    return weights
+
+
+def _stretches(trace: Trace, rest: Floats) -> Iterator[_Stretch]:
+    """Yield the rough stretches of a trace whose rest (n, k) is this."""
+    if not _is_asked(trace):
+        return
+    least = np.array([resolution(column) for column in trace.measured.T])
+    pulsed = pulse_rows(trace.time_s, rest, trace.segments, least) & ~_is_edge(trace, rest)
+    rough = pulsed | loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
+    rows = np.flatnonzero(rough)
+    if not len(rows):
+        return
+    breaks = np.flatnonzero(np.diff(trace.time_s[rows]) > _LIMITS.event_apart_s) + 1
+    for part in np.split(rows, breaks):
+        first, last = int(part[0]), int(part[-1]) + 1
+        yield _Stretch(first, last, bool(pulsed[first:last].any()))
+
+
+def _is_edge(trace: Trace, rest: Floats) -> Bools:
+    """Return the rows (n,) of a force that is off by less than its model changes there: an edge."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    if trace.link.of_joints or trace.link.of_tip:
+        return np.zeros(len(rest), dtype=np.bool_)
+    around = 2 * int(_MOMENT_S / float(np.median(np.diff(trace.time_s)))) + 1
+    reach = maximum_filter1d(trace.nominal, around, axis=0) - minimum_filter1d(trace.nominal, around, axis=0)
+    edge: Bools = np.linalg.norm(rest, axis=1) < np.linalg.norm(reach, axis=1)
+    return edge
+
+
+def _is_outlier(stretch: _Stretch) -> bool:
+    return not stretch.is_pulse and stretch.last - stretch.first <= _OUTLIER_ROWS
+
+
+def _span(trace: Trace, stretch: _Stretch) -> Span:
+    return float(trace.time_s[stretch.first]), float(trace.time_s[stretch.last - 1])
+
+
+# What it is in step with
+
+
+def _in_step(
+    traces: Sequence[Trace],
+    stretches: Sequence[Sequence[_Stretch]],
+    chosen: Sequence[Bools],
+    least: int = _LIMITS.in_step_least,
+) -> list[list[bool]]:
+    """Return which stretches of each trace fall into chosen rows (n,); none where that may be chance."""
+    from scipy.special import bdtrc
+
+    inside = [
+        [bool(rows[each.first : each.last].any()) for each in own]
+        for own, rows in zip(stretches, chosen, strict=True)
+    ]
+    events = [not _is_outlier(each) for own in stretches for each in own]
+    counted = sum(a and b for a, b in zip(events, [each for own in inside for each in own], strict=True))
+    share = float(np.mean(np.concatenate(list(chosen))))
+    chance = bdtrc(counted - 1, sum(events), share) if counted else 1.0
+    if counted >= least and chance < _LIMITS.in_step_p:
+        return inside
+    return [[False] * len(own) for own in stretches]
+
+
+def command_changes(trace: Trace) -> Bools:
+    """Return the rows (n,) shortly after the command jerks, a joint turns back or the force jumps."""
+    inputs = trace.inputs
+    time_s = inputs.time_s
+    if len(time_s) < 5:
+        return np.zeros(len(trace.time_s), dtype=np.bool_)
+    rate = np.gradient(inputs.q_cmd_rad, time_s, axis=0)
+    acceleration = np.gradient(rate, time_s, axis=0)
+    later = time_s + _JERK_STEP_S
+    jerk = np.abs(
+        np.stack([np.interp(later, time_s, each) for each in acceleration.T], axis=1) - acceleration
+    )
+    largest = np.maximum(jerk.max(axis=0), 1e-12)
+    changes = (jerk / largest > _LIMITS.command_share).any(axis=1)
+    moving = np.abs(rate) > 1e-3 * np.maximum(np.abs(rate).max(axis=0), 1e-12)
+    changes[1:] |= ((np.sign(rate[1:]) * np.sign(rate[:-1]) < 0.0) & moving[1:]).any(axis=1)
+    force = inputs.force_base_N
+    most_N = float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    if most_N > 0.0:
+        next_N = np.stack([np.interp(time_s + _LIMITS.jump_s, time_s, each) for each in force.T], axis=1)
+        changes |= np.linalg.norm(next_N - force, axis=1) > _LIMITS.jump_share * most_N
+    at_s = time_s[changes]
+    after = trace.time_s[:, None] if len(at_s) == 0 else trace.time_s - _last_before(at_s, trace.time_s)
+    before = np.interp(trace.time_s + _LIMITS.same_place_s, time_s, changes.astype(np.float64)) > 0.0
+    near: Bools = before | (after < _LIMITS.command_lasts_s) if len(at_s) else before
+    return near
+
+
+def _last_before(at_s: Floats, time_s: Floats) -> Floats:
+    """Return the last of some moments before each time (n,); minus infinity where there is none."""
+    number = np.searchsorted(at_s, time_s, side="right")
+    last: Floats = np.append(-np.inf, at_s)[number]
+    return last
+
+
+def _repeated(
+    traces: Sequence[Trace],
+    rests: Sequence[Floats],
+    stretches: Sequence[Sequence[_Stretch]],
+    number: int,
+) -> list[bool]:
+    """Return which stretches of a trace every other run of the same program has too, at the same time.
+
+    Rough ones where the others are rough; pulses also where the others do the same, too small to be pulses.
+    """
+    trace = traces[number]
+    repeats = [i for i, other in enumerate(traces) if i != number and _is_repeat(trace, other)]
+    if not repeats:
+        return [False] * len(stretches[number])
+    others = [
+        _at(trace, [_span(traces[i], each) for each in stretches[i] if not _is_outlier(each)])
+        for i in repeats
+    ]
+    everywhere = np.all(others, axis=0)
+    # where all are rough most of the time that says nothing
+    if float(np.mean(everywhere)) > _LIMITS.bursts_most:
+        everywhere[:] = False
+    again = [linear(trace.time_s, traces[i].time_s, rests[i]) for i in repeats]
+    return [
+        not _is_outlier(each)
+        and (bool(everywhere[each.first : each.last].any()) or _is_in_all(each, rests[number], again))
+        for each in stretches[number]
+    ]
+
+
+def _is_in_all(stretch: _Stretch, rest: Floats, again: Sequence[Floats]) -> bool:
+    """Tell whether a pulse of a rest (n, k) is in all other ones (n, k) by half of its height at least."""
+    if not stretch.is_pulse:
+        return False
+    # between the rows before and behind it, so that a level of each run's own says nothing
+    rows = np.arange(max(stretch.first - 1, 0), min(stretch.last + 1, len(rest)))
+    share = np.linspace(0.0, 1.0, len(rows))[:, None]
+    own, *others = (
+        values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (rest, *again)
+    )
+    return all(float(np.sum(own * each)) > 0.5 * float(np.sum(own**2)) for each in others)
+
+
+def _is_repeat(one: Trace, other: Trace) -> bool:
+    a, b = one.inputs, other.inputs
+    same = len(a) == len(b) and one.run != other.run
+    return same and bool(np.allclose(a.position_mm, b.position_mm, atol=_SAME_MM))
+
+
+def _at(trace: Trace, spans: Sequence[Span]) -> Bools:
+    """Return the rows (n,) of a trace within some times, or near them."""
+    rows = np.zeros(len(trace.time_s), dtype=np.bool_)
+    for start_s, end_s in spans:
+        first, last = np.searchsorted(
+            trace.time_s, [start_s - _LIMITS.same_place_s, end_s + _LIMITS.same_place_s]
+        )
+        rows[first:last] = True
+    return rows
+
+
+# Whose it is
+
+
+def _sorted(
+    levels: "_Levels", stretches: Sequence[_Stretch], stays: Sequence[bool], coincident: Sequence[bool]
+) -> Trace:
+    trace = levels.trace
+    events, out, outliers = [], np.zeros(len(trace.time_s), dtype=np.bool_), 0
+    for stretch, in_step, in_both in zip(stretches, stays, coincident, strict=True):
+        rows = slice(stretch.first, stretch.last)
+        if in_step:
+            continue
+        if _is_outlier(stretch):
+            out[rows], outliers = True, outliers + stretch.last - stretch.first
+            continue
+        change, has_changed = levels.change(stretch)
+        whose = Whose.IMPULSE if stretch.is_pulse or in_both else Whose.INSTRUMENT
+        whose = Whose.SLIP if has_changed else whose
+        event = replace(levels.event(stretch, whose, change), is_shared=in_both)
+        # a slip that is no more than its change is what a step's moment is fitted to
+        out[rows] = whose is not Whose.SLIP or np.linalg.norm(event.peak) > np.linalg.norm(change)
+        events.append(event)
+    if not events and not out.any():
+        return trace
+    told = [f"{outliers} of {len(out)} rows: outliers of the instrument"] if outliers else []
+    return replace(
+        with_rows(trace, ~out),
+        events=(*trace.events, *events),
+        left_out=(*trace.left_out, *told),
+    )
+
+
+def _is_bursty(traces: Sequence[Trace]) -> bool:
+    """Tell whether a tracker or a force sensor bursts so often that a pulse of it may be a burst, too."""
+    bursts = sum(event.whose is Whose.INSTRUMENT for trace in traces for event in trace.events)
+    return not traces[0].link.of_joints and bursts >= _LIMITS.bursty_least
+
+
+def _of_a_bursty_instrument(trace: Trace) -> Trace:
+    events = (
+        replace(event, whose=Whose.INSTRUMENT) if event.whose is Whose.IMPULSE else event
+        for event in trace.events
+    )
+    return replace(trace, events=tuple(events))
+
+
+class _Levels:
+    """The level of a trace's rest before and after its stretches."""
+
+    def __init__(self, trace: Trace, rest: Floats) -> None:
+        self.trace, self._rest = trace, rest
+
+    def event(self, stretch: _Stretch, whose: Whose, change: Floats) -> Event:
+        """Return the event of a stretch."""
+        time_s = self.trace.time_s[stretch.first : stretch.last]
+        around = 0.5 * (self._level(stretch.first, -1) + self._level(stretch.last, 1))
+        off = self._rest[stretch.first : stretch.last] - around
+        squares = np.sum(off**2, axis=1)
+        middle_s = float(squares @ time_s) / max(float(squares.sum()), 1e-300)
+        at_s = middle_s if whose is Whose.IMPULSE else float(time_s[0] + time_s[-1]) / 2.0
+        return Event(
+            link=self.trace.link.name,
+            run=self.trace.run,
+            whose=whose,
+            span_s=(float(time_s[0]), float(time_s[-1])),
+            at_s=at_s,
+            line=line_at(self.trace.inputs, at_s),
+            peak=off[int(np.argmax(squares))],
+            change=change,
+            power=float(squares.sum()),
+        )
+
+    def change(self, stretch: _Stretch) -> tuple[Floats, bool]:
+        """Return by how much the level (k,) changes over a stretch, and whether that stays."""
+        change = self._level(stretch.last, 1) - self._level(stretch.first, -1)
+        return change, bool(np.any(np.abs(change) > _LIMITS.change_deviations * self._usual))
+
+    @cached_property
+    def _usual(self) -> Floats:
+        """(k,) robust deviation of the change of the level, anywhere in the run."""
+        count = len(self._rest)
+        rows = range(count // _LEVELS, count - count // _LEVELS, max(1, count // _LEVELS))
+        changes = np.stack([self._level(row + 1, 1) - self._level(row, -1) for row in rows])
+        return np.array([usual_deviation(each - np.median(each)) for each in changes.T])
+
+    def _level(self, row: int, way: int) -> Floats:
+        """Return the median (k,) of the rows after (1) or before (-1) a row."""
+        time_s = self.trace.time_s
+        row = min(max(row, 0), len(time_s) - 1)
+        end = int(np.searchsorted(time_s, time_s[row] + way * _LIMITS.change_level_s))
+        rows = (
+            self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
+        )
+        level: Floats = np.median(rows, axis=0)
+        return level

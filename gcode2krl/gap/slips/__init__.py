@@ -1,1 +1,0 @@
-"""Set-up slips, tested before everything else, a file a kind of slip; `order` says which comes when."""

@@ -1,1 +1,0 @@
-"""The answer: typed, in words, as JSON, into a cell file."""
