@@ -1,6 +1,6 @@
 """Fit the probabilities of the diagnosis to stored cases of the check, and write their table.
 
-``python benchmarks/gap_calibrate.py FOLDER`` reads the records that ``benchmarks/gap_blind.py`` has left in
+``python benchmarks/gap_calibrate.py FOLDER`` reads the records that ``benchmarks/blind/check.py`` has left in
 the folder of its ``--resume``, fits what ``gcode2krl/gap/posterior/calibrated.py`` uses, prints its errors
 with whole effects left out and what each test is worth, and writes ``gcode2krl/gap/probabilities.json`` (or
 ``-o TABLE``).
@@ -20,7 +20,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
-from gap_blind_figures import rate
+from blind.figures import rate
 from gap_calibrate_fit import (
     Scores,
     calibrated,
@@ -66,7 +66,7 @@ _HEAD = "| | rows | ECE | Brier | log score | right at p >= .9 | wrong at p >= .
 def main(given: Sequence[str] | None = None) -> int:
     """Fit, print and write; the exit code is 2 where the records cannot be used."""
     parser = argparse.ArgumentParser(prog="gap_calibrate.py", description=__doc__.split("\n")[0])
-    parser.add_argument("folder", type=Path, nargs="?", help="as given to gap_blind.py --resume")
+    parser.add_argument("folder", type=Path, nargs="?", help="as given to blind/check.py --resume")
     parser.add_argument("-o", dest="table", type=Path, help="where to write; by default into the package")
     parser.add_argument(
         "--made-up", action="store_true", help="made-up records instead of a folder; needs -o"

@@ -6,11 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gap_blind_cases import SCORED_FROM
-from gap_blind_depends import allowed_by, probabilities, says_family
-from gap_blind_names import Truth, is_among, names
-from gap_blind_score import VERDICTS
-from gap_blind_words import truth_of
+from blind.cases import SCORED_FROM
+from blind.score import VERDICTS, Truth, allowed_by, is_among, names, probabilities, says_family, truth_of
 
 from gcode2krl.gap.posterior.calibrated import (
     DEPENDENCE,
@@ -56,7 +53,7 @@ def records_of(folder: Path) -> list[dict[str, Any]]:
     records = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(_files(folder))]
     records = [record for record in records if record.get("result")]
     if not records:
-        raise RecordsError(f"no records in {folder}: run benchmarks/gap_blind.py --resume {folder}")
+        raise RecordsError(f"no records in {folder}: run benchmarks/blind/check.py --resume {folder}")
     sealed = [record["case"]["seed"] for record in records if record["case"]["seed"] >= SCORED_FROM]
     if sealed:
         raise RecordsError(f"seed {sealed[0]} is scored: nothing is calibrated on seeds from {SCORED_FROM}")

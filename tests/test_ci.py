@@ -9,7 +9,7 @@ SCRIPT = ROOT / ".ci" / "run"
 IN_TESTS = {
     "benchmarks/five_axis.py": "tests/cutting/test_turned.py",
     "benchmarks/gap_calibrate.py": "tests/benchmarks/test_gap_calibrate.py",
-    "benchmarks/gap_metamorphic.py": "tests/benchmarks/test_gap_metamorphic.py",
+    "benchmarks/blind/channels.py": "tests/benchmarks/test_gap_metamorphic.py",
     "benchmarks/online_faults.py": "tests/online/test_faults.py",
 }
 """Benchmarks of which a test does a small part, and that test."""
@@ -27,9 +27,8 @@ def test_the_slow_tests_run():
 
 
 def test_every_benchmark_runs():
-    benchmarks = {
-        f"benchmarks/{path.name}" for path in (ROOT / "benchmarks").glob("*.py") if is_program(path)
-    }
+    files = [*(ROOT / "benchmarks").glob("*.py"), *(ROOT / "benchmarks" / "blind").glob("*.py")]
+    benchmarks = {path.relative_to(ROOT).as_posix() for path in files if is_program(path)}
     assert len(benchmarks) > 10
     in_steps = {name for name in benchmarks if any(f"{name} " in f"{step} " for step in steps())}
     assert benchmarks - in_steps == set(IN_TESTS)

@@ -11,10 +11,10 @@ import pytest
 
 from tests.benchmarks import hand_made
 
-cases = import_module("gap_blind_cases")
-workers = import_module("gap_blind_workers")
-runs = import_module("gap_blind_run")
-blind = import_module("gap_blind")
+cases = import_module("blind.cases")
+workers = import_module("blind.cases")
+runs = import_module("blind.cases")
+blind = import_module("blind.check")
 
 
 def test_blocks_of_seeds_never_mix():

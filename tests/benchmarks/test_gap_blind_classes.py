@@ -8,11 +8,11 @@ import pytest
 from tests.benchmarks.hand_made import answer, cause, depends, effect, record
 from tests.plant.kinds import plan_of
 
-classes = import_module("gap_blind_classes")
-decided = import_module("gap_blind_decided")
-dependences = import_module("gap_blind_depends")
-moments = import_module("gap_blind_moments")
-score = import_module("gap_blind_score")
+classes = import_module("blind.figures")
+decided = import_module("blind.figures")
+dependences = import_module("blind.score")
+moments = import_module("blind.score")
+score = import_module("blind.score")
 
 AT = [{"run": "run-2", "t_s": 11.8, "lasts_s": 0.02}]
 
@@ -90,7 +90,7 @@ def test_without_a_moment_in_the_label_none_is_scored():
 
 
 def test_an_unknown_in_a_set_is_no_effect_and_a_group_names_its_members():
-    names = import_module("gap_blind_names")
+    names = import_module("blind.score")
     unknown = cause("friction") | {
         "indistinguishable_from": [{"kind": "unknown", "at": "A2", "on": "velocity"}]
     }

@@ -7,7 +7,7 @@ import pytest
 
 from tests.benchmarks import hand_made  # noqa: F401 - puts the benchmarks on the path
 
-blind = import_module("gap_blind")
+blind = import_module("blind.check")
 
 pytestmark = pytest.mark.slow
 

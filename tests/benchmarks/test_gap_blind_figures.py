@@ -8,8 +8,8 @@ import pytest
 
 from tests.benchmarks import hand_made  # noqa: F401 - puts the benchmarks on the path
 
-figures = import_module("gap_blind_figures")
-baselines = import_module("gap_blind_baselines")
+figures = import_module("blind.figures")
+baselines = import_module("blind.cases")
 
 
 def test_bounds_of_a_rate_agree_with_their_definition():

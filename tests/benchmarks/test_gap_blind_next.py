@@ -9,8 +9,8 @@ import pytest
 
 from tests.benchmarks.hand_made import answer, cause, effect, record
 
-following = import_module("gap_blind_next")
-canned = import_module("gap_blind_canned")
+following = import_module("blind.next_run")
+canned = import_module("blind.next_run")
 
 TRUTH = ("backlash", "A2")
 LEFT_OPEN = [cause(alike=[("hysteresis", "A2")])]

@@ -6,10 +6,10 @@ import pytest
 
 from tests.benchmarks.hand_made import answer, cause, depends, effect
 
-places = import_module("gap_blind_places")
-numbers = import_module("gap_blind_numbers")
-dependences = import_module("gap_blind_depends")
-tests = import_module("gap_blind_tests")
+places = import_module("blind.score")
+numbers = import_module("blind.score")
+dependences = import_module("blind.score")
+tests = import_module("blind.score")
 
 
 def said(value, low, high):

@@ -4,9 +4,9 @@ from importlib import import_module
 
 from tests.benchmarks.hand_made import cause, depends, effect, record
 
-rows = import_module("gap_blind_rows")
-tables = import_module("gap_blind_print")
-score = import_module("gap_blind_score")
+rows = import_module("blind.tables")
+tables = import_module("blind.tables")
+score = import_module("blind.score")
 
 
 def figures(*records):

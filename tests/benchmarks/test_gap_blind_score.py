@@ -6,7 +6,7 @@ import pytest
 
 from tests.benchmarks.hand_made import cause, depends, effect, record
 
-score = import_module("gap_blind_score")
+score = import_module("blind.score")
 
 
 def test_a_right_answer():

@@ -208,5 +208,5 @@ def test_what_no_data_can_tell_teaches_nothing(tmp_path, kind, stand_ins, teache
 
 
 def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(rows_.RecordsError, match="gap_blind"):
+    with pytest.raises(rows_.RecordsError, match="no records"):
         rows_.records_of(tmp_path)

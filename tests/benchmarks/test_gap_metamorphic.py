@@ -7,8 +7,8 @@ import pytest
 
 from tests.benchmarks.hand_made import answer, cause, effect
 
-metamorphic = import_module("gap_metamorphic")
-channels = import_module("gap_blind_channels")
+metamorphic = import_module("blind.channels")
+channels = import_module("blind.channels")
 
 RIGHT, WRONG, NONE = answer([cause()]), answer([cause("friction")]), answer(verdict="unexplained")
 

@@ -15,9 +15,9 @@ from tests.plant.robot import simulate
 from tests.plant.scene import World
 from tests.plant.waypoints import PROGRAMS
 
-cases = import_module("gap_blind_cases")
-words = import_module("gap_blind_words")
-oracle = import_module("gap_blind_oracle")
+cases = import_module("blind.cases")
+words = import_module("blind.score")
+oracle = import_module("blind.cases")
 
 DRAWS = 12
 SIZE = 0.02

@@ -13,8 +13,8 @@ from gcode2krl.gap import diagnose
 from tests.plant.cases import make_case
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-blind = import_module("gap_blind_run")
-plans_of = import_module("gap_blind_cases").predictions
+blind = import_module("blind.cases")
+plans_of = import_module("blind.cases").predictions
 
 pytestmark = pytest.mark.slow
 COLUMNS = {"tracker": ("x_mm", "y_mm", "z_mm"), "force": ("fx_N", "fy_N", "fz_N")}

@@ -1,6 +1,6 @@
 """How often `diagnose` is right on runs of a robot that it has never seen, and its false alarms.
 
-``python benchmarks/gap_blind.py --cases 200 --seed N`` makes cases with the independent plant of
+``python benchmarks/blind/check.py --cases 200 --seed N`` makes cases with the independent plant of
 ``tests/plant``, diagnoses each without its label, and prints the table of metrics, what each test did, the
 confusions and simple methods beside it. ``--full`` is the whole check, ``--full --scale 0.1`` its first
 tenth. Seeds below 30000 are for development and calibration, those from 30000 on are scored; the two never
@@ -15,25 +15,130 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":  # a case runs on one core; must be set before numpy is loaded
     for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "GCODE2KRL_THREADS"):
         os.environ.setdefault(_name, "1")
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from gap_blind_cases import KINDS, SCORED_FROM, Case, full_counts, in_turn, mixed, plan, scaled
-from gap_blind_next import Asked, next_records
-from gap_blind_print import failures, report
-from gap_blind_run import How, fingerprint
-from gap_blind_score import judge
-from gap_blind_workers import NoClusterError, done, fresh_records, say, store
+import numpy as np
+from blind.cases import (
+    CELL_TOML,
+    KINDS,
+    SCORED_FROM,
+    Case,
+    How,
+    NoClusterError,
+    done,
+    fingerprint,
+    fresh_records,
+    full_counts,
+    in_turn,
+    mixed,
+    plan,
+    say,
+    scaled,
+    store,
+)
+from blind.next_run import Asked, next_records
+from blind.score import judge
+from blind.tables import failures, report
+
+from gcode2krl import Prediction, load_cell, load_run, predict
+from tests.plant import faults, instruments, mismatch, writing
+from tests.plant.robot import simulate
+from tests.plant.scene import World
+from tests.plant.waypoints import Writer
+
+ROWS, FEED_mm_s = 17, 60.0
+ROW_S = 3.3
+"""That a row along y takes."""
+EFFECT, SIZE = "backlash@A2", 0.02
+
+
+def long_program(rows: int = ROWS) -> Writer:
+    """Rows along y, to and fro over the whole block until there are so many; back between those of before."""
+    w = Writer("LONG", -4, -92, 30)
+    w.rapid(z=2).feed(FEED_mm_s, z=-3)
+    for i in range(rows):
+        column = i % (2 * ROWS)
+        x = -4 + 9 * (column if column < ROWS else 2 * ROWS - 1.5 - column)
+        w.feed(FEED_mm_s, x=x).feed(FEED_mm_s, y=92 if i % 2 == 0 else -92)
+    return w.rapid(z=30)
+
+
+def timing(seconds: float = ROWS * ROW_S, effect: str = EFFECT, size: float = SIZE, times: int = 2) -> str:
+    """Return how long predictions, plant and diagnosis took, and the peak memory of the whole process.
+
+    The first diagnosis loads compiled code. One of long runs takes minutes and gigabytes.
+    """
+    import resource  # where there is one: not on Windows
+
+    from gcode2krl.gap import diagnose
+
+    program = long_program(max(1, round(seconds / ROW_S)))
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        writing.write_text(folder / "cell.toml", CELL_TOML)
+        writing.write_text(folder / "long.nc", program.text())
+        marks = [time.perf_counter()]
+        predict(folder / "long.nc", load_cell(folder / "cell.toml")).save(folder / "prediction")
+        marks.append(time.perf_counter())
+        length_s = _runs(folder, program, effect, size)
+        marks.append(time.perf_counter())
+        answers = []
+        for _ in range(times):
+            runs = [load_run(folder / f"run-{i + 1}") for i in range(3)]
+            gap = diagnose(Prediction.load(folder / "prediction"), runs).as_dict()
+            answers.append(
+                ", ".join(f"{c['effect']} {c['target']} {c['probability']:.2f}" for c in gap["causes"])
+            )
+            marks.append(time.perf_counter())
+    parts = np.diff(marks)
+    peak_MB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    diagnoses = ", ".join(f"{part:.1f} s" for part in parts[2:])
+    return (
+        f"three runs of {length_s:.0f} s with {effect}: prediction {parts[0]:.1f} s, plant {parts[1]:.1f} s, "
+        f"diagnosis {diagnoses}, peak {peak_MB:.0f} MB ({gap['verdict']}: {answers[-1] or 'no cause'})"
+    )
+
+
+def _runs(folder: Path, program: Writer, effect: str, size: float) -> float:
+    rng = np.random.default_rng(1)
+    how = replace(
+        instruments.drawn(rng, frozenset({"controller", "tracker", "force", "q_load"})),
+        tracker_hz=100.0,
+        controller_s=0.012,
+        scan=False,
+    )
+    fault = faults.build(effect, "same", 1)
+    robot = mismatch.of_robot(rng)
+    for number in range(3):
+        run = simulate(
+            program.waypoints(),
+            World(),
+            [fault.hooks(size)],
+            mismatch.of_day(robot, rng),
+            0.0,
+            number,
+        )
+        place = folder / f"run-{number + 1}"
+        place.mkdir()
+        for name, table in instruments.noisy(instruments.clean(run, how), how, run.units, rng).items():
+            writing.write_table(place / name, table, parquet=False)
+        keys = {"program": "../long.nc", "prediction": "../prediction", "angles": "absolute"}
+        writing.write_text(
+            place / "run.toml",
+            writing.run_toml(keys, {"frames": {"tracker": "base", "force": how.force_frame}}),
+        )
+    return float(run.t_s[-1])
 
 
 def arguments(given: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="gap_blind.py", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(prog="check.py", description=__doc__.split("\n")[0])
     parser.add_argument("--cases", type=int, default=0, help="mixed cases of all kinds")
     parser.add_argument("--full", action="store_true", help="the whole check")
     parser.add_argument("--small", action="store_true", help="a null, a single and an open case, to try it")
@@ -93,23 +198,19 @@ def main(given: Sequence[str] | None = None) -> int:
     """Run the check; the exit code is 0 whatever it found, 2 where the options make no sense."""
     options = arguments(given)
     if options.timing:
-        from gap_blind_timing import timing
-
         print(timing())
         return 0
     if options.timing_runs:
-        from gap_blind_timing import timing
-
         seconds, effect, size = options.timing_runs
         print(timing(float(seconds), effect, float(size), times=1))
         return 0
     try:
         cases = plan(options.seed, counts_of(options), [name for name in options.effects.split(",") if name])
     except ValueError as error:
-        say(f"gap_blind: {error}")
+        say(f"check: {error}")
         return 2
     if not cases:
-        say("gap_blind: nothing to do: give --cases, --full, --small or numbers of each kind")
+        say("check: nothing to do: give --cases, --full, --small or numbers of each kind")
         return 2
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as scratch:
@@ -150,7 +251,7 @@ def _records(
 
 def _decided(records: list[dict[str, Any]], folder: Path, jobs: int, until_s: float) -> list[dict[str, Any]]:
     """Return the records, all with distances, and store those that are new."""
-    from gap_blind_decided import decide
+    from blind.figures import decide
 
     fresh = {}
     for record in decide(records, folder / "signatures", jobs, until_s):

@@ -1,6 +1,6 @@
 """Does a channel more or less make a right answer worse?
 
-``python benchmarks/gap_metamorphic.py --cases 30 --seed 1`` makes cases of one effect with every channel that
+``python benchmarks/blind/channels.py --cases 30 --seed 1`` makes cases of one effect with every channel that
 a run can have, diagnoses each as it is and without each channel in turn, and compares. Taking a channel away
 may cost the name only where the effect is smaller than the noise in all that is left; it may never lead to a
 wrong name. Adding the channel again may do neither. Exit code 1 where an answer became worse.
@@ -9,6 +9,7 @@ wrong name. Adding the channel again may do neither. Exit code 1 where an answer
 import argparse
 import multiprocessing
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,19 +18,97 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":  # a case runs on one core; numpy must not be loaded yet
+if __name__ == "__main__":  # a case runs on one core; must be set before numpy is loaded
     for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "GCODE2KRL_THREADS"):
         os.environ.setdefault(_name, "1")
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from gap_blind_cases import Case, predictions
-from gap_blind_cases import plan as planned
-from gap_blind_channels import CHANNELS, shows_without, without
-from gap_blind_figures import grouped, rate
-from gap_blind_print import table
-from gap_blind_run import answer, drawn, driven, fingerprint
-from gap_blind_score import Judged, judge
-from gap_blind_workers import done, say, store
+import polars as pl
+from blind.cases import Case, answer, done, drawn, driven, fingerprint, predictions, say, store
+from blind.cases import plan as planned
+from blind.figures import grouped, rate
+from blind.score import Judged, judge
+from blind.tables import table
+
+JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
+
+
+def _columns(pattern: str, joints: Iterable[int] = range(1, 7)) -> tuple[str, ...]:
+    return tuple(pattern.format(joint) for joint in joints)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A table of a run, or columns of it."""
+
+    table: str
+    columns: tuple[str, ...] = ()
+    """The whole table where empty."""
+    signals: tuple[str, ...] = ()
+    """Signals of the label that go with it."""
+    joints: tuple[str, ...] = JOINTS
+    """Joints whose signals go with it."""
+
+
+LOAD = "q{}_load_deg"
+CHANNELS = {
+    "tracker": Channel("tracker", signals=("tcp",)),
+    "orientation": Channel("tracker", ("a_deg", "b_deg", "c_deg")),
+    "force": Channel("force", signals=("force",)),
+    "moments": Channel("force", ("mx_Nm", "my_Nm", "mz_Nm")),
+    "controller": Channel("controller", signals=("joint_commanded", "joint_actual", "joint_load")),
+    "load encoders": Channel("controller", _columns(LOAD), ("joint_load",)),
+    "load encoders of A1-A3": Channel("controller", _columns(LOAD, (1, 2, 3)), ("joint_load",), JOINTS[:3]),
+    "load encoders of A4-A6": Channel("controller", _columns(LOAD, (4, 5, 6)), ("joint_load",), JOINTS[3:]),
+    "motor torques": Channel("controller", _columns("tau{}_Nm")),
+    "scan": Channel("scan", signals=("scan",)),
+}
+"""Name -> what is taken away."""
+MEASURES = ("tracker", "force", "controller")
+"""At least one of these tables must be left."""
+
+
+def without(channel: Channel, case: Path, to: Path) -> bool:
+    """Copy a case without a channel; False, and no copy, where it has none or nothing else."""
+    shutil.copytree(case, to)
+    changed = [_taken(channel, run) for run in sorted(to.glob("run-*"))]
+    left = all(any(_file(run, table) for table in MEASURES) for run in to.glob("run-*"))
+    if any(changed) and left:
+        return True
+    shutil.rmtree(to)
+    return False
+
+
+def _taken(channel: Channel, run: Path) -> bool:
+    file = _file(run, channel.table)
+    if file is None:
+        return False
+    if not channel.columns:
+        file.unlink()
+        return True
+    binary = file.suffix == ".parquet"
+    table = pl.read_parquet(file) if binary else pl.read_csv(file, infer_schema_length=None)
+    present = [name for name in channel.columns if name in table.columns]
+    smaller = table.drop(present)
+    if binary:
+        smaller.write_parquet(file)
+    else:
+        smaller.write_csv(file)
+    return bool(present)
+
+
+def _file(run: Path, table: str) -> Path | None:
+    return next((file for ending in ("csv", "parquet") if (file := run / f"{table}.{ending}").exists()), None)
+
+
+def shows_without(channel: Channel, entry: dict[str, Any]) -> bool:
+    """Tell whether an effect is at least as large as the noise in a signal that is left without a channel."""
+    joints = set((entry.get("depends") or {}).get("joints") or JOINTS)
+    gone = set(channel.signals) if joints <= set(channel.joints) else set()
+    ratios = {name: signal["ratio"] for name, signal in entry["signals"].items()}
+    ratios[entry["main_signal"]] = entry["ratio"]
+    return any(ratio >= 1.0 for name, ratio in ratios.items() if name not in gone)
+
 
 WHOLE = "(all)"
 SAME, LOST, HIDDEN, WRONG = "same", "lost", "lost, does not show", "wrong name"
@@ -54,9 +133,9 @@ class Change:
 
 
 def arguments(given: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="gap_metamorphic.py", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(prog="channels.py", description=__doc__.split("\n")[0])
     parser.add_argument("--cases", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=1, help="first seed, as in gap_blind.py")
+    parser.add_argument("--seed", type=int, default=1, help="first seed, as in check.py")
     parser.add_argument("--effects", default="", help="names, joined by commas: these in turn")
     parser.add_argument("--channels", default="", help="names, joined by commas; default: all")
     parser.add_argument("--jobs", type=int, default=2)
@@ -186,13 +265,13 @@ def main(given: Sequence[str] | None = None) -> int:
     options = arguments(given)
     channels = [name.strip() for name in options.channels.split(",") if name.strip()] or list(CHANNELS)
     if unknown := set(channels) - set(CHANNELS):
-        say(f"gap_metamorphic: no channel {', '.join(sorted(unknown))}; there are {', '.join(CHANNELS)}")
+        say(f"channels: no channel {', '.join(sorted(unknown))}; there are {', '.join(CHANNELS)}")
         return 2
     try:
         effects = [name for name in options.effects.split(",") if name]
         cases = planned(options.seed, {"single": options.cases}, effects)
     except ValueError as error:
-        say(f"gap_metamorphic: {error}")
+        say(f"channels: {error}")
         return 2
     with tempfile.TemporaryDirectory() as scratch:
         records = records_of(cases, options.resume or Path(scratch), channels, options.jobs)
