@@ -66,8 +66,7 @@ def convention(value: _Value, reason: str) -> _Value:
 
 
 def _stated(value: _Value, kind: Kind, reason: str, seeds: range | None = None) -> _Value:
-    threshold: _Value = field(default=value, metadata={"kind": kind, "reason": reason, "seeds": seeds})
-    return threshold
+    return field(default=value, metadata={"kind": kind, "reason": reason, "seeds": seeds})
 
 
 def listed(rooms: Any) -> Iterator[Threshold]:

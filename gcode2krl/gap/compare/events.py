@@ -110,8 +110,7 @@ def _outliers(values: Floats, segments: Ints, usual: float) -> Bools:
 
 def _widened(rows: Bools, by: int) -> Bools:
     """Return rows (n,) with this many on either side."""
-    widened: Bools = np.convolve(rows, np.ones(2 * by + 1), mode="same") > 0.5
-    return widened
+    return np.convolve(rows, np.ones(2 * by + 1), mode="same") > 0.5
 
 
 _LEAST_PULSE_ROWS = 5
@@ -460,8 +459,7 @@ def command_changes(trace: Trace) -> Bools:
 def _last_before(at_s: Floats, time_s: Floats) -> Floats:
     """Return the last of some moments before each time (n,); minus infinity where there is none."""
     number = np.searchsorted(at_s, time_s, side="right")
-    last: Floats = np.append(-np.inf, at_s)[number]
-    return last
+    return np.append(-np.inf, at_s)[number]
 
 
 def _repeated(
@@ -617,5 +615,4 @@ class _Levels:
         rows = (
             self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
         )
-        level: Floats = np.median(rows, axis=0)
-        return level
+        return np.median(rows, axis=0)

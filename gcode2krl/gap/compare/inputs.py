@@ -71,8 +71,7 @@ class Corners:
 
     def passed(self, samples: Ints) -> Floats:
         """Return for some samples (n,) 1 from each blended corner on, (n, c)."""
-        steps: Floats = (samples[:, None] >= self._rows).astype(np.float64)
-        return steps
+        return (samples[:, None] >= self._rows).astype(np.float64)
 
     @cached_property
     def roundings(self) -> Floats:
@@ -322,8 +321,7 @@ class Admissible:
             - (nominal - nominal[:1])
             for by_s in _LATE_S
         ]
-        late: Floats = np.moveaxis(np.stack([*shifted, *filtered]), (0, 1, 2), (2, 1, 0))
-        return late
+        return np.moveaxis(np.stack([*shifted, *filtered]), (0, 1, 2), (2, 1, 0))
 
     @cached_property
     def with_memory(self) -> Floats:

@@ -89,8 +89,7 @@ def frame_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
 
 def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     """Return (k, n, 1): what the clock of the table does to the signal, to first order."""
-    columns: Floats = -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
-    return columns
+    return -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
 
 
 def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:

@@ -202,8 +202,7 @@ class Pair:
 
     def stamps(self, table: Measured) -> Floats:
         """Return the time stamps of a table less its coarse clock error."""
-        stamps: Floats = table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)
-        return stamps
+        return table.time_s - self.clock_s.get(type(table).__name__.lower(), 0.0)
 
     def later(self, table: str, offset_s: float) -> "Pair":
         """Return the pair with a clock error of ``offset_s`` taken off the stamps of a table."""
@@ -285,8 +284,7 @@ def _smooth(values: Floats, rows: int) -> Floats:
     """Return the mean of ``rows`` neighbours of each row of (n, c)."""
     kernel = np.ones(max(rows, 1))
     count = np.convolve(np.ones(len(values)), kernel, mode="same")
-    found: Floats = np.stack([np.convolve(v, kernel, mode="same") / count for v in values.T], axis=1)
-    return found
+    return np.stack([np.convolve(v, kernel, mode="same") / count for v in values.T], axis=1)
 
 
 def usable_rows(table: Measured, stamps: Floats, inputs: Inputs, ends_s: float = 0.0) -> tuple[Ints, Ints]:
@@ -471,8 +469,7 @@ def _of_second_degree(q_rad: Floats, among_rad: Floats) -> Floats:
     spread = np.maximum(among_rad.std(axis=0), 1e-9)
     q = (q_rad - among_rad.mean(axis=0)) / spread
     first, second = np.triu_indices(q.shape[1])
-    terms: Floats = np.concatenate([np.ones((len(q), 1)), q, q[:, first] * q[:, second]], axis=1)
-    return terms
+    return np.concatenate([np.ones((len(q), 1)), q, q[:, first] * q[:, second]], axis=1)
 
 
 def log_pairs(runs: Sequence[Run], cell: Cell | None) -> list[Pair]:

@@ -72,8 +72,7 @@ class CommandedPath:
     def gone_mm(self) -> Floats:
         """(n,) way up to each sample."""
         steps = np.linalg.norm(np.diff(self.tip_mm, axis=0), axis=1)
-        gone: Floats = np.concatenate([[0.0], np.cumsum(steps)])
-        return gone
+        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:

@@ -218,8 +218,7 @@ class Trace:
         step, signals = _LIMITS.clock_difference_s, self._plain
         times = self.time_s - self.plus_late_s
         apart = [interpolate(signals, self.plus, times + s) for s in (step, -step)]
-        found: Floats = (apart[0] - apart[1])[:, list(self.columns)] / (2.0 * step)
-        return found
+        return (apart[0] - apart[1])[:, list(self.columns)] / (2.0 * step)
 
     @cached_property
     def kinks(self) -> Floats:
@@ -238,8 +237,7 @@ class Trace:
         near = np.maximum(kinks, np.maximum(np.roll(kinks, 1, axis=0), np.roll(kinks, -1, axis=0)))
         if self.in_sensor_frame or self.in_tool_frame:  # whichever way they are turned
             near = np.repeat(np.linalg.norm(near, axis=1, keepdims=True), near.shape[1], axis=1)
-        found: Floats = near[nearest_rows(own_s, self.time_s - self.plus_late_s)][:, list(self.columns)]
-        return found
+        return near[nearest_rows(own_s, self.time_s - self.plus_late_s)][:, list(self.columns)]
 
     @cached_property
     def _plain(self) -> Signals:

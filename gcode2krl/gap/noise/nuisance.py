@@ -235,8 +235,7 @@ class NuisanceDesign:
 
     def effect(self, number: int, trace: Trace, b: Floats) -> Floats:
         """Return N·b (n, k) of a trace for coefficients b (m,)."""
-        effect: Floats = (self.columns(number, trace) @ b[self.places[number]]).T
-        return effect
+        return (self.columns(number, trace) @ b[self.places[number]]).T
 
 
 def _shared(nuisance: Sequence[Sequence[Nuisance]]) -> Iterator[Nuisance]:

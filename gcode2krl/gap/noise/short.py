@@ -257,8 +257,7 @@ def _calm(values: Floats, windows: Ints, most: float, floor: float) -> Bools:
         return np.ones(len(values), dtype=np.bool_)
     powers = np.bincount(windows, weights=values**2) / counts
     scatter = np.maximum(_WINDOW / counts, 1.0)  # windows of few rows scatter more
-    calm: Bools = (powers <= most * scatter * max(float(np.median(powers)), floor**2))[windows]
-    return calm
+    return (powers <= most * scatter * max(float(np.median(powers)), floor**2))[windows]
 
 
 def _share_off(products: Floats, drawn: Floats) -> float:
@@ -350,8 +349,7 @@ def _stable(a: Floats) -> Floats:
     most = _LIMITS.noise_largest_pole
     if largest <= most:
         return a
-    shrunk: Floats = a * (most / largest) ** np.arange(1, len(a) + 1)
-    return shrunk
+    return a * (most / largest) ** np.arange(1, len(a) + 1)
 
 
 _PADDED = 4

@@ -473,8 +473,7 @@ def _basis(columns: Floats) -> Floats:
     """Return an orthonormal basis of columns (n, p)."""
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
     u, s, _ = np.linalg.svd(columns / scale, full_matrices=False)
-    basis: Floats = u[:, s > 1e-6 * max(float(s.max(initial=0.0)), 1e-300)]
-    return basis
+    return u[:, s > 1e-6 * max(float(s.max(initial=0.0)), 1e-300)]
 
 
 _FULL = 0.6
@@ -604,8 +603,7 @@ def _stacked(own: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence[N
     alike = len({each.shape[1] for each in shared}) == 1
     together = np.concatenate(shared) if alike else _block_diagonal(shared)
     columns = np.column_stack([trends, together, _block_diagonal(single)])
-    kept: Floats = columns[:, np.any(columns != 0.0, axis=0)]
-    return kept
+    return columns[:, np.any(columns != 0.0, axis=0)]
 
 
 def _block_diagonal(parts: Sequence[Floats]) -> Floats:

@@ -441,8 +441,7 @@ def _basis(columns: Floats) -> Floats:
     """Return an orthonormal basis (v, r) of what columns (v, c) span."""
     scale = np.linalg.norm(columns, axis=0)
     left, singular, _ = np.linalg.svd(columns[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
-    basis: Floats = left[:, singular > _RANK * singular.max(initial=0.0)]
-    return basis
+    return left[:, singular > _RANK * singular.max(initial=0.0)]
 
 
 _COMPARE_LIMITS = THRESHOLDS.beside

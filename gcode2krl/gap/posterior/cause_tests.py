@@ -335,8 +335,7 @@ def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
     scores = likelihood.scores(jacobian, likelihood.residual(fitted.applied))
     if len(scores) >= _LIMITS.least_stretches:
         covariance = clustered_covariance(covariance, scores, small_sample=True)
-    scaled: Floats = covariance * np.outer(scale, scale)
-    return scaled
+    return covariance * np.outer(scale, scale)
 
 
 _FAMILY_LIMITS = THRESHOLDS.families

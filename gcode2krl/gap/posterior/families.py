@@ -270,13 +270,11 @@ class View:
     @cached_property
     def projected(self) -> Floats:
         """(v,) r without what unbounded tangents and nuisance explain."""
-        left: Floats = self.residual - self.fixed @ self.solved(self.cross)
-        return left
+        return self.residual - self.fixed @ self.solved(self.cross)
 
     def without_fixed(self, columns: Floats) -> Floats:
         """Return columns (v, c) without what tangents and nuisance explain of them."""
-        left: Floats = columns - self.fixed @ self.solved((columns.T @ self.fixed).T)
-        return left
+        return columns - self.fixed @ self.solved((columns.T @ self.fixed).T)
 
     def by_stretch(self, values: Floats) -> csr_array:
         """Return what sums columns, times values (v,), over each stretch of time, (g, v)."""
@@ -360,8 +358,7 @@ class Columns:
     @cached_property
     def gram(self) -> Floats:
         """(c, c) Bᵀ·B."""
-        gram: Floats = self.values.T @ self.values
-        return gram
+        return self.values.T @ self.values
 
     def on_nuisance(self, view: View) -> Floats:
         """Return Bᵀ·N (c, m); views that keep the same nuisance share it."""
@@ -387,14 +384,12 @@ class Beside:
     @property
     def gram(self) -> Floats:
         """(c, c) Bᵀ·P."""
-        gram: Floats = self.columns.gram - self.fixed @ self.taken
-        return gram
+        return self.columns.gram - self.fixed @ self.taken
 
     @property
     def score(self) -> Floats:
         """(c,) Pᵀ·r."""
-        score: Floats = self.on_residual - self.taken.T @ self.view.cross
-        return score
+        return self.on_residual - self.taken.T @ self.view.cross
 
     @property
     def scores(self) -> Floats:
@@ -408,13 +403,11 @@ class Beside:
     @property
     def moved_scores(self) -> Floats:
         """Return Pᵀ times the residuals that are moved in time (shifts, c)."""
-        scores: Floats = self.view.moved @ self.columns.values - self.view.moved_cross @ self.taken
-        return scores
+        return self.view.moved @ self.columns.values - self.view.moved_cross @ self.taken
 
     def explained(self, weights: Floats) -> Floats:
         """Return P times weights (c,), (v,)."""
-        explained: Floats = self.columns.values @ weights - self.view.fixed @ (self.taken @ weights)
-        return explained
+        return self.columns.values @ weights - self.view.fixed @ (self.taken @ weights)
 
     def scores_without(self, explained: Floats) -> Floats:
         """Return White's scores (g, c) with what is explained (v,) taken off the residual."""

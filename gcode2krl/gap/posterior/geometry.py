@@ -291,8 +291,7 @@ def _blocks(clouds: Sequence[SurfacePoints]) -> Ints:
 
 def _in_blocks(cloud: SurfacePoints) -> Floats:
     """Return the column and row (n, 2) of the block of each point."""
-    place: Floats = np.floor(cloud.place[:, :2] / _COMPARE_LIMITS.scan_block_mm)
-    return place
+    return np.floor(cloud.place[:, :2] / _COMPARE_LIMITS.scan_block_mm)
 
 
 def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:

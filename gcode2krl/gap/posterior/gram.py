@@ -132,8 +132,7 @@ def cluster_scores(jacobian: Floats, residual: Floats, clusters: Ints) -> Floats
     used = np.bincount(clusters) > 0
     at = (np.cumsum(used) - 1)[clusters]
     sums = [np.bincount(at, column * residual, int(used.sum())) for column in jacobian.T]
-    scores: Floats = np.stack(sums, axis=1) if sums else np.zeros((int(used.sum()), 0))
-    return scores
+    return np.stack(sums, axis=1) if sums else np.zeros((int(used.sum()), 0))
 
 
 def clustered_covariance(inverse: Floats, scores: Floats, small_sample: bool = False) -> Floats:
@@ -267,8 +266,7 @@ class _Joined(NamedTuple):
             [self.cross[np.ix_(new, fixed)].T, self.fixed[np.ix_(fixed, fixed)]],
         ]
         back = np.argsort(np.argsort(~is_new, kind="stable"))
-        gram: Floats = np.block(blocks)[np.ix_(back, back)]
-        return gram
+        return np.block(blocks)[np.ix_(back, back)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,8 +443,7 @@ def marginal(gram: Floats, keep: int) -> Floats:
     """Return the Gram matrix of the first ``keep`` columns with the rest as nuisance of unit variance."""
     rest = gram[keep:, keep:] + np.eye(len(gram) - keep)
     cross = gram[:keep, keep:]
-    result: Floats = gram[:keep, :keep] - cross @ np.linalg.solve(rest, cross.T)
-    return result
+    return gram[:keep, :keep] - cross @ np.linalg.solve(rest, cross.T)
 
 
 class Part(NamedTuple):
@@ -511,8 +508,7 @@ class SplitColumns:
         sums = np.zeros((*left.shape[:-1], self.width + 1))
         for part in self.parts:
             sums[..., part.at] += by_row[..., part.rows] @ part.values
-        product: Floats = np.concatenate([left @ self.whole, sums[..., :-1]], axis=-1)
-        return product
+        return np.concatenate([left @ self.whole, sums[..., :-1]], axis=-1)
 
     @cached_property
     def gram(self) -> Floats:

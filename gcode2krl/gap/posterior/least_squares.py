@@ -284,8 +284,7 @@ class Free:
             values[size] = amplitude * math.cos(angle)
             values[effect.phase.name] = amplitude * math.sin(angle)
         numbers = np.array([values[name] for name in self.names], dtype=np.float64)
-        clipped: Floats = np.clip(numbers, self.low, self.high)
-        return clipped
+        return np.clip(numbers, self.low, self.high)
 
     def at_bound(self, x: Floats) -> bool:
         """Tell whether a size stands at an end of its plausible range."""

@@ -79,8 +79,7 @@ class CountedOnce:
     def gone(self, applied: Applied) -> Bools:
         """Return which coefficients (m,) are of the form of an effect."""
         none = np.zeros(self.design.width, dtype=np.bool_)
-        found: Bools = self._own(applied) | self.alike.get(_key(applied), none)
-        return found
+        return self._own(applied) | self.alike.get(_key(applied), none)
 
     def kept(self, applied: Iterable[Applied], clocks: bool = False) -> Floats | None:
         """Return the projection (m, m) of b onto what is left of it beside effects; None where all is.
@@ -311,8 +310,7 @@ class Likelihood:
         kept, normal = self._kept(applied), self._normal
         if kept is None:
             return boxed(normal, projections)
-        free: Floats = kept @ boxed(_kept_normal(kept, normal), kept @ projections)
-        return free
+        return kept @ boxed(_kept_normal(kept, normal), kept @ projections)
 
     def _kept(self, applied: Sequence[Applied]) -> Floats | None:
         """Return the projection (m, m) of b onto what is left of it beside effects of the same form."""
@@ -432,8 +430,7 @@ def _sure(trace: Trace, nuisance: Sequence[Nuisance], noise: Sequence[Noise]) ->
 def _kept_normal(kept: Floats, normal: Floats) -> Floats:
     """Return the normal matrix (m, m) of b where only a projection of it reaches the data."""
     identity = np.eye(len(normal))
-    inner: Floats = kept @ (normal - identity) @ kept + identity
-    return inner
+    return kept @ (normal - identity) @ kept + identity
 
 
 _MOST_STEPS = 12

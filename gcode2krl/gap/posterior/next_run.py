@@ -370,8 +370,7 @@ def information_of(found: Examination, number: int | None, second: Applied) -> F
     except Gcode2KrlError:
         return None
     projected = likelihood.projected(slopes)
-    found_information: Floats = projected.T @ projected / _LIMITS.temperature
-    return found_information
+    return projected.T @ projected / _LIMITS.temperature
 
 
 def _trace_of(like: Trace, inputs: Inputs) -> Trace:

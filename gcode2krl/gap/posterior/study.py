@@ -73,14 +73,12 @@ def _main_axis(every: Evidence, family: Family) -> Floats:
     """Return the direction (d,), in units of the place, along which a family has most of its signal."""
     units = [unit[:, 0] for unit in family.place.units]
     rows = np.concatenate([np.linalg.solve(u, own.T).T for u, own in zip(units, every.signal, strict=True)])
-    axis: Floats = np.linalg.eigh(rows.T @ rows)[1][:, -1]
-    return axis
+    return np.linalg.eigh(rows.T @ rows)[1][:, -1]
 
 
 def _turned(columns: Floats, along: Floats) -> Floats:
     """Return columns (…, f·d) along a direction (d,), (…, f)."""
-    turned: Floats = columns.reshape(*columns.shape[:-1], -1, len(along)) @ along
-    return turned
+    return columns.reshape(*columns.shape[:-1], -1, len(along)) @ along
 
 
 _CONSTANT = frozenset({Dependence.CONSTANT})
@@ -160,8 +158,7 @@ class Steps:
     def _times(self, number: int) -> Floats:
         """Return the moments in a trace; at its ends a step is a difference between runs."""
         trace, every_s = self.traces[number], self.every_s[number]
-        times: Floats = np.arange(trace.time_s[0] + _FROM_END_S, trace.time_s[-1] - _FROM_END_S, every_s)
-        return times
+        return np.arange(trace.time_s[0] + _FROM_END_S, trace.time_s[-1] - _FROM_END_S, every_s)
 
     def coarse(self) -> list[Moment]:
         """Return the moments of the first search."""
@@ -266,8 +263,7 @@ def _each(values: Floats, scores: Floats) -> Floats:
     shrunk = (squares / (1.0 + grown)).swapaxes(1, 2)
     fall = falls.reshape(len(values), -1, values.shape[1]) @ shrunk
     evidence = log_mean(0.5 * fall - 0.5 * np.log1p(grown).sum(axis=-1)[:, None])
-    each: Floats = np.moveaxis(evidence.reshape(falls.shape[:-1]), 0, -1)
-    return each
+    return np.moveaxis(evidence.reshape(falls.shape[:-1]), 0, -1)
 
 
 def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
@@ -401,8 +397,7 @@ def angle_tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator
 
 def _angle(trace: Trace, joint: int) -> Floats:
     """Return the commanded angle (n,) of a joint."""
-    angle: Floats = np.interp(trace.time_s, trace.inputs.time_s, trace.inputs.q_cmd_rad[:, joint])
-    return angle
+    return np.interp(trace.time_s, trace.inputs.time_s, trace.inputs.q_cmd_rad[:, joint])
 
 
 def _orders(angle: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -508,8 +503,7 @@ def _signs(view: View, seed: int) -> Floats:
     """Return random signs (flips, g) of the stretches of time."""
     generator = np.random.default_rng(seed)
     shape = (_LIMITS.flips, view.members.shape[0])
-    signs: Floats = np.where(generator.random(shape) < 0.5, -1.0, 1.0)
-    return signs
+    return np.where(generator.random(shape) < 0.5, -1.0, 1.0)
 
 
 def _study(view: View, found: Sequence[Evidence], moved: Callable[[], Floats]) -> Study:
