@@ -78,6 +78,11 @@ class Applied:
         return f"{self.effect.name}:{','.join((*target, *values))}".rstrip(":")
 
     @property
+    def key(self) -> tuple[str, Target]:
+        """Return the names of effect and target."""
+        return self.effect.name, self.target
+
+    @property
     def label(self) -> str:
         """Return name and target, ``backlash A2``."""
         return self.effect.name if self.target is None else f"{self.effect.name} {self.target}"

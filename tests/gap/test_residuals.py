@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gcode2krl.gap.answer.evidence import residuals_of, rms_length, smoothed
+from gcode2krl.gap.answer.evidence import residuals_of, smoothed
+from gcode2krl.gap.compare.interpolation import rms_length
 from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 

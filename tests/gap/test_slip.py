@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from gcode2krl.errors import input_error
+from gcode2krl.gap.compare.interpolation import rms_length
 from gcode2krl.gap.compare.links import FORCE
-from gcode2krl.gap.compare.slips import best_of, rms, rms_before, rms_left, slip_if_explained
+from gcode2krl.gap.compare.slips import best_of, rms_before, rms_left, slip_if_explained
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import applied
 
@@ -31,8 +32,8 @@ def _taking(share):
 
 
 def test_the_rms_is_that_of_the_length_of_rows():
-    assert rms([GAP]) == pytest.approx(np.sqrt(12.5))
-    assert rms([GAP[:1], GAP[1:]]) == rms([GAP])
+    assert rms_length([GAP]) == pytest.approx(np.sqrt(12.5))
+    assert rms_length([GAP[:1], GAP[1:]]) == rms_length([GAP])
     assert rms_before([KnownTrace()]) == pytest.approx(np.sqrt(12.5))
     assert rms_left([KnownTrace()], _taking(0.5)) == pytest.approx(0.5 * np.sqrt(12.5))
 

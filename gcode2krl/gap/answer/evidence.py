@@ -9,7 +9,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Dependence, Inputs, arm
 from gcode2krl.effects.inputs import gradient
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.gap.compare.interpolation import nearest_rows
+from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.noise.nuisance import nuisance_for
@@ -208,15 +208,10 @@ def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.tell.smo
     """Return the mean of values (n,) or (n, k) over a time, that of fewer samples at the ends."""
     if values.ndim == 2:
         return np.stack([smoothed(time_s, column, over_s) for column in values.T], axis=1)
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else over_s
+    step_s = usual_step_s(time_s) if len(time_s) > 1 else over_s
     kernel = np.ones(min(max(1, round(over_s / step_s)), len(values)))
     sums: Floats = np.convolve(values, kernel, mode="same")
     return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
-
-
-def rms_length(shapes: Sequence[Floats]) -> float:
-    """Return the rms length of the rows of arrays (n, k)."""
-    return float(np.sqrt(np.mean(np.concatenate([np.sum(shape**2, axis=1) for shape in shapes]))))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -331,7 +326,7 @@ def _component(residuals: Sequence[Residual], at: str | None) -> tuple[str, list
     if first.link is MECHANICS and at in JOINTS:
         joint = JOINTS.index(str(at))
         along = [_along_joint(each.trace, joint) for each in residuals]
-        return f"along what {at} moves", along, float(np.sqrt(np.mean(noise**2)))
+        return f"along what {at} moves", along, rms(noise)
     direction = _principal(shapes)
     axes = " of the sensor" if first.in_sensor_frame else ""
     text = ", ".join(f"{value:.1f}" for value in np.round(direction, 1) + 0.0)

@@ -40,6 +40,7 @@ from gcode2krl.gap.answer.words import (
     where_words,
     worst,
 )
+from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.report.drawing import BLUE, GREY, PALE, SKY, VERMILION, line_ticks, look, thin
 from gcode2krl.report.figures import shown_in_notebooks
 from gcode2krl.report.page.one_file import base_css
@@ -245,7 +246,7 @@ def _add_lines(axes: Axes, run: RunEvidence) -> None:
 
 def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return time and values with a missing one in each gap, so that no line is drawn across it."""
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    step_s = usual_step_s(time_s) if len(time_s) > 1 else 1.0
     gaps = np.flatnonzero(np.diff(time_s) > 5.0 * step_s) + 1
     return np.insert(time_s, gaps, time_s[gaps - 1] + step_s), np.insert(values, gaps, np.nan)
 

@@ -10,10 +10,10 @@ import numpy as np
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied, Inputs
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.gap.answer.evidence import Residual, knows_place, rms_length, smoothed, tip_of
+from gcode2krl.gap.answer.evidence import Residual, knows_place, smoothed, tip_of
 from gcode2krl.gap.answer.result import AtPart, IntervalResult, JointResult, PhaseResult, RunSize, Where
 from gcode2krl.gap.compare.clocks import timing_sizes
-from gcode2krl.gap.compare.interpolation import nearest_rows
+from gcode2krl.gap.compare.interpolation import nearest_rows, rms, rms_length, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, JOINTS, MECHANICS, TIMING
 from gcode2krl.gap.compare.slips import Slip
 from gcode2krl.gap.compare.trace import Link, Trace
@@ -70,7 +70,7 @@ def over_noise(trace: Trace, shape: Floats, noise: Floats) -> Floats:
         largest: Floats = np.sqrt(ratios.max(axis=1))
         return largest
     size: Floats = np.sqrt(np.maximum(smoothed(trace.time_s, np.sum(shape**2, axis=1)), 0.0))
-    return size / max(float(np.sqrt(np.mean(noise**2))), _NO_NOISE)
+    return size / max(rms(noise), _NO_NOISE)
 
 
 def _stretches(trace: Trace, shape: Floats, noise: Floats, least_s: float) -> Iterator[Ints]:
@@ -225,7 +225,7 @@ def _along_joints(traces: Sequence[Trace], shapes: Sequence[Floats]) -> Floats:
 
 def _band(trace: Trace, shape: Floats) -> tuple[float, ...]:
     """Return the band (Hz) between the 10 % and 90 % points of the power of what is not constant."""
-    step_s = float(np.median(np.diff(trace.time_s)))
+    step_s = usual_step_s(trace.time_s)
     power = np.sum(np.abs(np.fft.rfft(shape - shape.mean(axis=0), axis=0)) ** 2, axis=1)
     total = float(power.sum())
     if total <= 0.0:

@@ -18,7 +18,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.gap.compare.interpolation import cubic, values_of
+from gcode2krl.gap.compare.interpolation import cubic, length_along, rms, usual_step_s, values_of
 from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.trace import Context, Link, Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -58,7 +58,7 @@ def _rms(traces: Sequence[Trace], applied: Sequence[Applied]) -> float:
         late, moves = late_s(trace, trace.measured - trace.sample(applied))
         values.append(late[moves])
     every = np.concatenate(values)
-    return float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
+    return rms(every) if len(every) else 0.0
 
 
 def residual_by_place(trace: Trace, applied: Sequence[Applied]) -> Floats:
@@ -77,7 +77,7 @@ def residual_by_place(trace: Trace, applied: Sequence[Applied]) -> Floats:
     times = signals.true_time(trace.plus, trace.time_s - trace.plus_late_s)
     along = np.interp(times, signals.time_s, way)
     at_s = np.interp(along, measured_way, measured_s)
-    step = 0.5 * float(np.median(np.diff(signals.time_s)))
+    step = 0.5 * usual_step_s(signals.time_s)
     rate = (trace.at(signals, trace.time_s + step) - trace.at(signals, trace.time_s - step)) / (2.0 * step)
     late = at_s - trace.time_s
     power = np.sum(rate**2, axis=1)
@@ -97,7 +97,7 @@ def gone(time_s: Floats, values: Floats, least: float) -> tuple[Floats, Floats]:
     """Return times and how far the signal has gone by them; ways below ``least`` count once they add up."""
     kept = _anchors(values, least) if least > 0.0 else slice(None)
     time_s, values = time_s[kept], values[kept]
-    return time_s, np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
+    return time_s, length_along(values)
 
 
 def _anchors(values: Floats, least: float) -> Ints:
@@ -173,7 +173,7 @@ def with_controller_clocks(context: Context, path: "Link") -> Context:
         ]
 
     left = [trace.residual for trace in path.traces(later(0.0))]
-    if not left or float(np.sqrt(np.mean(np.concatenate(left) ** 2))) >= path.model_rms:
+    if not left or rms(np.concatenate(left)) >= path.model_rms:
         return context
     return replace(context.with_pairs(later(kept_s)), clocks_set=True)
 
@@ -228,8 +228,8 @@ def retimed(pair: Pair) -> Pair:
     if table is None or path_rad is None or not np.isfinite(path_rad).all():
         return pair
     inputs, own_s = pair.inputs, pair.stamps(table)
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_rad, axis=0), axis=1))])
-    wanted = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(inputs.q_cmd_rad, axis=0), axis=1))])
+    travelled = length_along(path_rad)
+    wanted = length_along(inputs.q_cmd_rad)
     if (
         travelled[-1] <= 0.0
         or wanted[-1] <= 0.0
@@ -312,7 +312,7 @@ def _median_offset_s(trace: Trace) -> float:
 def _at_times(pair: Pair, time_s: Floats) -> Pair:
     """Return the pair with other times of its samples; their order is kept."""
     inputs = pair.inputs
-    least = 0.01 * float(np.median(np.diff(inputs.time_s)))
+    least = 0.01 * usual_step_s(inputs.time_s)
     steps = np.maximum(np.diff(time_s), least)
     time_s = time_s[0] + np.concatenate([[0.0], np.cumsum(steps)])
     motion = None if inputs.motion is None else replace(inputs.motion, time_s=time_s)

@@ -40,7 +40,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Inputs
 from gcode2krl.gap.compare.inputs import Admissible
-from gcode2krl.gap.compare.interpolation import Bands, linear, resolution, usual_deviation
+from gcode2krl.gap.compare.interpolation import Bands, linear, resolution, usual_deviation, usual_step_s
 from gcode2krl.gap.compare.trace import Event, Span, Trace, Whose, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import RAD_PER_REV
@@ -61,7 +61,7 @@ def loud_rows(time_s: Floats, values: Floats, segments: Ints, model: Floats | No
     loud = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * _LEAST_WINDOW:
         return loud
-    window = max(_LEAST_WINDOW, round(_LIMITS.burst_s / float(np.median(np.diff(time_s))))) | 1
+    window = max(_LEAST_WINDOW, round(_LIMITS.burst_s / usual_step_s(time_s))) | 1
     for j, column in enumerate(values.T):
         rough = np.abs(_fourth_differences(column, segments))
         usual = float(np.median(rough[np.isfinite(rough)])) if np.isfinite(rough).any() else 0.0
@@ -126,7 +126,7 @@ def pulse_rows(time_s: Floats, values: Floats, segments: Ints, least: Floats) ->
     ``least`` (k,): rms of rounding to the last decimal. A component with many pulses has none: so it is.
     """
     pulsed = np.zeros(len(values), dtype=np.bool_)
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    step_s = usual_step_s(time_s) if len(time_s) > 1 else 1.0
     around = max(_rows(_LIMITS.pulse_around_s, step_s), 4 * _LEAST_PULSE_ROWS + 1)
     for column, smallest in zip(values.T, least.tolist(), strict=True):
         own = np.zeros(len(values), dtype=np.bool_)
@@ -192,7 +192,7 @@ def _without(trace: Trace) -> Trace:
     count = len(trace.time_s)
     if trace.still or not trace.link.has_instrument or count < _LIMITS.hum_least_rows:
         return trace
-    step_s = float(np.median(np.diff(trace.time_s)))
+    step_s = usual_step_s(trace.time_s)
     measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])
     # what is folded to a drift is none to be told
     told = (hz for hz in _mains_hz(trace) if 4.0 * _LIMITS.hum_around_hz < _folded(hz, step_s))
@@ -389,7 +389,7 @@ def _is_edge(trace: Trace, rest: Floats) -> Bools:
 
     if trace.link.of_joints or trace.link.of_tip:
         return np.zeros(len(rest), dtype=np.bool_)
-    around = 2 * int(_MOMENT_S / float(np.median(np.diff(trace.time_s)))) + 1
+    around = 2 * int(_MOMENT_S / usual_step_s(trace.time_s)) + 1
     reach = maximum_filter1d(trace.nominal, around, axis=0) - minimum_filter1d(trace.nominal, around, axis=0)
     edge: Bools = np.linalg.norm(rest, axis=1) < np.linalg.norm(reach, axis=1)
     return edge

@@ -1,5 +1,6 @@
 """Signals between their samples, what the last decimal of a table is worth, and spectra in narrow bands."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -102,6 +103,33 @@ def _place(times_s: Floats, own_s: Floats) -> tuple[Ints, Floats]:
     row, share = np.empty(len(times_s), dtype=np.int64), np.empty(len(times_s))
     _fill_place(times_s, own_s, row, share)
     return row, share
+
+
+def usual_step_s(time_s: Floats) -> float:
+    """Return the median step of times (n,)."""
+    return float(np.median(np.diff(time_s)))
+
+
+def length_along(values: Floats) -> Floats:
+    """Return the way (n,) along a polyline (n, k), 0 first."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
+
+
+def rms(values: Floats) -> float:
+    """Return the root of the mean square of all values."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def rms_length(vectors: Iterable[Floats]) -> float:
+    """Return the rms length of the rows of arrays (n, k)."""
+    return float(np.sqrt(np.mean(np.concatenate([np.sum(each**2, axis=1) for each in vectors]))))
+
+
+def running_mean(values: Floats, rows: int) -> Floats:
+    """Return the mean of ``rows`` neighbours of each row of (n, c), of fewer at the ends."""
+    kernel = np.ones(max(rows, 1))
+    count = np.convolve(np.ones(len(values)), kernel, mode="same")
+    return np.stack([np.convolve(column, kernel, mode="same") / count for column in values.T], axis=1)
 
 
 _NORMAL, _NORMAL_MEAN = 1.4826, 1.2533

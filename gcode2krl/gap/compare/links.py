@@ -17,7 +17,7 @@ from gcode2krl.effects import Applied, Inputs, Signals, drives, forces, simulate
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.effects.operators import play
 from gcode2krl.gap.compare.clocks import refined, retimed, with_table_clock
-from gcode2krl.gap.compare.interpolation import cubic, linear, nearest_rows
+from gcode2krl.gap.compare.interpolation import cubic, linear, nearest_rows, running_mean, usual_step_s
 from gcode2krl.gap.compare.pair import Pair, usable_rows, with_nominal_joints, with_own_model
 from gcode2krl.gap.compare.trace import Context, FittedVerdict, Link, Trace, Verdict, is_lost, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -662,10 +662,7 @@ def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
         return tip, bent
     own_s = pair.stamps(table)
     offset = table.position_mm - linear(own_s, inputs.time_s, tip)
-    width = max(1, round(_LIMITS.scan_smooth_s / float(np.median(np.diff(own_s)))))
-    kernel = np.ones(width)
-    weight = np.convolve(np.ones(len(offset)), kernel, mode="same")
-    smooth = np.stack([np.convolve(column, kernel, mode="same") / weight for column in offset.T], axis=1)
+    smooth = running_mean(offset, round(_LIMITS.scan_smooth_s / usual_step_s(own_s)))
     return tip + linear(inputs.time_s, own_s, smooth), np.zeros_like(bent)
 
 

@@ -27,7 +27,16 @@ from gcode2krl.effects import Applied, Signals, commanded, inputs_of, simulate
 from gcode2krl.effects.inputs import Cut, Inputs
 from gcode2krl.effects.operators import play
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gap.compare.interpolation import cubic, linear, nearest_rows, resolution
+from gcode2krl.gap.compare.interpolation import (
+    cubic,
+    length_along,
+    linear,
+    nearest_rows,
+    resolution,
+    rms,
+    running_mean,
+    usual_step_s,
+)
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.pipeline import plan_motion
 from gcode2krl.prediction import Prediction
@@ -223,11 +232,11 @@ class Pair:
         if frame in ("sensor", "tcp"):
             turn = inputs.sensor_rotation if frame == "sensor" else inputs.tool_rotation
             force_N = np.einsum("nij,nj->ni", turn[nearest_rows(inputs.time_s, own_s)], force_N)
-        rows = round(_LIMITS.load_smooth_s / float(np.median(np.diff(own_s))))
+        rows = round(_LIMITS.load_smooth_s / usual_step_s(own_s))
         seen = simulate(inputs, applied).force_meas_base_N if applied else inputs.force_base_N
         bending = simulate(inputs, base).force_base_N if base else inputs.force_base_N
-        beside = linear(inputs.time_s, own_s, _smooth(force_N - linear(own_s, inputs.time_s, seen), rows))
-        load = bending + beside
+        off_N = running_mean(force_N - linear(own_s, inputs.time_s, seen), rows)
+        load = bending + linear(inputs.time_s, own_s, off_N)
         load[~inputs.force_base_N.any(axis=1)] = 0.0
         return replace(self, inputs=replace(inputs, load_base_N=load))
 
@@ -260,7 +269,7 @@ class Pair:
             return inputs.q_cmd_rad
         stamps = self.stamps(table)
         difference = np.nan_to_num(table.q_cmd_rad - cubic(stamps, inputs.time_s, inputs.q_cmd_rad))
-        if float(np.sqrt(np.mean(difference**2))) <= _LIMITS.same_path_rad:
+        if rms(difference) <= _LIMITS.same_path_rad:
             return inputs.q_cmd_rad
         return inputs.q_cmd_rad + linear(inputs.time_s, stamps, difference)
 
@@ -278,13 +287,6 @@ class Pair:
         apart = cubic(inputs.time_s, stamps, np.nan_to_num(difference))
         apart[:, np.isnan(measured).all(axis=0)] = np.nan
         return apart
-
-
-def _smooth(values: Floats, rows: int) -> Floats:
-    """Return the mean of ``rows`` neighbours of each row of (n, c)."""
-    kernel = np.ones(max(rows, 1))
-    count = np.convolve(np.ones(len(values)), kernel, mode="same")
-    return np.stack([np.convolve(v, kernel, mode="same") / count for v in values.T], axis=1)
 
 
 def usable_rows(table: Measured, stamps: Floats, inputs: Inputs, ends_s: float = 0.0) -> tuple[Ints, Ints]:
@@ -314,28 +316,38 @@ def pose_pair(run: Run, number: int, cell: Cell, hours: float, known_robot: bool
     table = run.poses
     if table is None:
         raise ValueError("a run of poses has a table of them")
-    tool = cell.usual_tool or 1
-    count = len(table)
-    position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    if known_robot and run.head.angles == "absolute":
-        position, rotation = robot.forward(table.q_rad, cell, tool)
-    inputs = Inputs(
-        cell=cell,
-        time_s=table.time_s,
-        move=np.zeros(count, dtype=np.int32),
-        source_line=np.zeros(count, dtype=np.int32),
-        path_mm=np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))]),
-        tool=np.full(count, tool, dtype=np.int32),
-        spindle_rad_s=np.zeros(count),
-        q_cmd_rad=table.q_rad,
-        position_mm=position,
-        rotation=rotation,
-        force_base_N=np.zeros((count, 3)),
-        moment_base_Nmm=np.zeros((count, 3)),
+    is_placed = known_robot and run.head.angles == "absolute"
+    inputs = replace(
+        _unplanned(cell, table.time_s, table.q_rad, is_placed),
         hours=hours,
         temperature_C=temperature_at(table, table.time_s),
     )
     return Pair(run=run, number=number, inputs=inputs, from_log=True, known_robot=known_robot, still=True)
+
+
+def _unplanned(cell: Cell, time_s: Floats, q_rad: Floats, is_placed: bool) -> Inputs:
+    """Return inputs of joints (n, 6) that no program has planned, without forces.
+
+    ``is_placed``: the robot and the zeros of its joints are known; else the tip stays at the origin.
+    """
+    count, tool = len(q_rad), cell.usual_tool or 1
+    position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+    if is_placed:
+        position, rotation = robot.forward(q_rad, cell, tool)
+    return Inputs(
+        cell=cell,
+        time_s=time_s,
+        move=np.zeros(count, dtype=np.int32),
+        source_line=np.zeros(count, dtype=np.int32),
+        path_mm=length_along(position),
+        tool=np.full(count, tool, dtype=np.int32),
+        spindle_rad_s=np.zeros(count),
+        q_cmd_rad=q_rad,
+        position_mm=position,
+        rotation=rotation,
+        force_base_N=np.zeros((count, 3)),
+        moment_base_Nmm=np.zeros((count, 3)),
+    )
 
 
 def refined_prediction(prediction: Prediction) -> Prediction:
@@ -343,7 +355,7 @@ def refined_prediction(prediction: Prediction) -> Prediction:
     motion = prediction.motion
     if motion is None or len(motion) < 3 or prediction.joints is None:
         return prediction
-    if float(np.median(np.diff(motion.time_s))) <= _LIMITS.fine_step_s * 1.01:
+    if usual_step_s(motion.time_s) <= _LIMITS.fine_step_s * 1.01:
         return prediction
     try:
         targets, cell = prediction.targets, prediction.cell
@@ -351,7 +363,7 @@ def refined_prediction(prediction: Prediction) -> Prediction:
         fine = kept.motion
         again = cubic(motion.time_s, fine.time_s, fine.position_mm)
         apart = np.linalg.norm(again - motion.position_mm, axis=1)
-        if float(np.sqrt(np.mean(apart**2))) > _LIMITS.fine_same_mm:
+        if rms(apart) > _LIMITS.fine_same_mm:
             return prediction
         joints = kept.joints(cell)
         forces = None
@@ -500,36 +512,19 @@ def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | N
     still = [resolution(column) * np.sqrt(12.0) for column in logged.T]
     between = cubic(time_s, table.time_s, logged)
     q = np.stack([play(column, width) for column, width in zip(between.T, still, strict=True)], axis=1)
-    count = len(q)
-    tool = cell.usual_tool or 1
-    kinematic = known_robot and run.head.angles == "absolute" and bool(np.isfinite(path).all())
-    position, rotation = np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    if kinematic:
-        position, rotation = robot.forward(q, cell, tool)
-    load = np.zeros((count, 3))
-    if kinematic and run.force is not None:
-        measured = linear(time_s, run.force.time_s, run.force.force_N)
+    is_placed = known_robot and run.head.angles == "absolute" and bool(np.isfinite(path).all())
+    inputs = _unplanned(cell, time_s, q, is_placed)
+    if is_placed and run.force is not None:
+        force_N = linear(time_s, run.force.time_s, run.force.force_N)
         if run.head.frames.force != "base":
-            turned = fr.rotation_from_quaternion(rotation)
+            turned = fr.rotation_from_quaternion(inputs.rotation)
             if run.head.frames.force == "sensor":
-                turned = turned @ cell.tool_matrix(tool)[:3, :3].T
-            measured = np.einsum("nij,nj->ni", turned, measured)
-        load = measured
+                turned = turned @ cell.tool_matrix(cell.usual_tool or 1)[:3, :3].T
+            force_N = np.einsum("nij,nj->ni", turned, force_N)
+        inputs = replace(inputs, force_base_N=force_N)
     torque_Nm = _torque_Nm(table)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
-    return Inputs(
-        cell=cell,
-        time_s=time_s,
-        move=np.zeros(count, dtype=np.int32),
-        source_line=np.zeros(count, dtype=np.int32),
-        path_mm=way,
-        tool=np.full(count, tool, dtype=np.int32),
-        spindle_rad_s=np.zeros(count),
-        q_cmd_rad=q,
-        position_mm=position,
-        rotation=rotation,
-        force_base_N=load,
-        moment_base_Nmm=np.zeros((count, 3)),
+    return replace(
+        inputs,
         hours=hours,
         torque_Nm=None if torque_Nm is None else linear(time_s, table.time_s, torque_Nm),
         temperature_C=temperature_at(table, time_s),

@@ -27,9 +27,10 @@ from gcode2krl.effects.builtin.advance_stop import with_stops
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.compare.clocks import gone, with_table_clock
 from gcode2krl.gap.compare.inputs import rows_of_passing
+from gcode2krl.gap.compare.interpolation import rms_length, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, MECHANICS, PATH
 from gcode2krl.gap.compare.pair import Pair, Simulator
-from gcode2krl.gap.compare.trace import Link, Signal, Trace
+from gcode2krl.gap.compare.trace import Link, Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import check_against
 from gcode2krl.units import DEG_PER_RAD
@@ -198,7 +199,7 @@ class Slip:
     """A slip, where it showed, and whether anything can be said beyond it."""
 
     applied: Applied
-    link: Signal
+    link: Link
     rms_before: float
     """In the unit of the report, as ``rms_after``, which is None where the slip cannot be simulated."""
     rms_after: float | None
@@ -229,19 +230,14 @@ def motion_traces(pairs: Sequence[Pair]) -> list[Trace]:
     ] or MECHANICS.traces(pairs)
 
 
-def rms(vectors: Iterable[Floats]) -> float:
-    """Return the rms length of the rows of arrays (n, k)."""
-    return float(np.sqrt(np.mean(np.concatenate([np.sum(each**2, axis=1) for each in vectors]))))
-
-
 def rms_left(traces: Sequence[Trace], applied: Applied) -> float:
     """Return the rms length of what is left with an effect in the model."""
-    return rms(trace.measured - trace.sample([applied]) for trace in traces)
+    return rms_length(trace.measured - trace.sample([applied]) for trace in traces)
 
 
 def rms_before(traces: Sequence[Trace]) -> float:
     """Return the rms length of the gap, a constant clock error of a run left in."""
-    return rms(trace.residual for trace in traces)
+    return rms_length(trace.residual for trace in traces)
 
 
 def best_of(traces: Sequence[Trace], candidates: Sequence[Applied]) -> tuple[Applied, float]:
@@ -417,7 +413,7 @@ def _is_nearer(pair: Pair, in_air: Pair) -> bool:
     if is_bent.sum() < THRESHOLDS.beside.trace_least_rows:
         return False
     quarters = zip(np.array_split(cutting[is_bent], 4), np.array_split(air[is_bent], 4), strict=True)
-    return all(rms([own]) < _LIMITS.air_share * rms([other]) for other, own in quarters)
+    return all(rms_length([own]) < _LIMITS.air_share * rms_length([other]) for other, own in quarters)
 
 
 _OVERRIDE = "override"
@@ -476,7 +472,7 @@ class _InMotion(NamedTuple):
 
 def _in_motion(time_s: Floats, values: Floats, still: float) -> _InMotion:
     """Return for how long values (n, k) move faster than ``still`` a second, and how far."""
-    every = max(1, round(_LIMITS.motion_step_s / float(np.median(np.diff(time_s)))))
+    every = max(1, round(_LIMITS.motion_step_s / usual_step_s(time_s)))
     way = np.linalg.norm(np.diff(values[::every], axis=0), axis=1)
     step_s = np.diff(time_s[::every])
     moves = way > still * step_s

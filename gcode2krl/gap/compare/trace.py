@@ -25,6 +25,7 @@ from gcode2krl.gap.compare.interpolation import (
     interpolate,
     linear,
     nearest_rows,
+    usual_step_s,
     values_of,
 )
 from gcode2krl.gap.compare.pair import Pair, Simulator
@@ -66,8 +67,8 @@ class Event:
     """Another table is rough at that moment, too."""
 
 
-class Signal:
-    """What a link compares: names and units, clocks, and how its model is simulated."""
+class Link:
+    """One link: names, units and clocks of its signal, its trace and its model, what later links learn."""
 
     name: str
     signal: str
@@ -126,6 +127,39 @@ class Signal:
         """Tell whether the time law may be slightly off in it, given the links without data."""
         return self.tells_time
 
+    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> "Trace | None":
+        """Return the measured signal of a run, None where it has none; ``base`` belongs to its model."""
+        return None
+
+    def traces(self, pairs: Iterable[Pair], base: Sequence[Applied] = ()) -> "list[Trace]":
+        """Return the measured signals, one a run that has it and is long enough to be judged."""
+        traces = [self.trace(pair, base) for pair in pairs]
+        return [
+            trace for trace in traces if trace is not None and len(trace.time_s) >= _LIMITS.trace_least_rows
+        ]
+
+    def base(self, context: "Context") -> tuple[Applied, ...]:
+        """Return the effects that are part of its model from the start."""
+        return context.slips
+
+    def clocks(self, context: "Context") -> int:
+        """Return how many clocks of their own the compared signals have.
+
+        Where the run's own timing replaced the plan's, an instrument's clock is known four times worse.
+        """
+        path = context.timing
+        if is_lost(path):
+            return _LIMITS.clocks_lost
+        return 1 if path is None or path.verdict == "no_gap" else 2
+
+    def clock_share(self, context: "Context") -> float:
+        """Return the share of its clocks' normal mismatch that is left after they were set."""
+        return 1.0
+
+    def learn(self, context: "Context", judged: "FittedVerdict") -> "Context":
+        """Return what is known to later links after this one was judged."""
+        return context
+
 
 _KINK_ROWS = 5
 """Samples of a jump of the rate and one on either side."""
@@ -135,7 +169,7 @@ _KINK_ROWS = 5
 class Trace:
     """A measured signal (n, k), the inputs of its model, and which signals of the model it is."""
 
-    link: Signal
+    link: Link
     run: str
     run_number: int
     simulator: Simulator
@@ -272,7 +306,7 @@ class Trace:
         times = signals.true_time(self.plus, self.time_s)
         values = values_of(signals, self.plus)[:, list(self.columns)]
         fine, coarse = cubic(times, signals.time_s, values), cubic(times, signals.time_s[::2], values[::2])
-        kink = self.kinks * float(np.median(np.diff(signals.time_s))) / 4.0
+        kink = self.kinks * usual_step_s(signals.time_s) / 4.0
         return self.link.model_rms + np.abs(fine - coarse) + kink
 
     def signals(self, applied: Sequence[Applied]) -> Signals:
@@ -431,18 +465,11 @@ def with_rows(trace: Trace, chosen: Bools) -> Trace:
     return replace(trace, time_s=trace.time_s[rows], measured=trace.measured[rows], segments=segments)
 
 
-class JudgedLink(Protocol):
-    """What is asked of a link that was judged."""
-
-    name: str
-    tells_time: bool
-
-
 class Verdict(Protocol):
     """What the judgement of a link says to all that comes later."""
 
     @property
-    def link(self) -> "JudgedLink":
+    def link(self) -> Link:
         """Return the judged link."""
 
     @property
@@ -567,40 +594,3 @@ def unmeasured_at(effect: Effect, target: str | None, joints: Mapping[str, froze
     """Return the links of joints, among those with data, that lack a joint which an effect moves."""
     moved = effect.joints_at(target)
     return frozenset(link for link, measured in joints.items() if not moved <= measured)
-
-
-class Link(Signal):
-    """One link: its names, how its trace is made, what its clocks are, what later links learn from it."""
-
-    def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
-        """Return the measured signal of a run, None where it has none; ``base`` belongs to its model."""
-        return None
-
-    def traces(self, pairs: Iterable[Pair], base: Sequence[Applied] = ()) -> list[Trace]:
-        """Return the measured signals, one a run that has it and is long enough to be judged."""
-        traces = [self.trace(pair, base) for pair in pairs]
-        return [
-            trace for trace in traces if trace is not None and len(trace.time_s) >= _LIMITS.trace_least_rows
-        ]
-
-    def base(self, context: Context) -> tuple[Applied, ...]:
-        """Return the effects that are part of its model from the start."""
-        return context.slips
-
-    def clocks(self, context: Context) -> int:
-        """Return how many clocks of their own the compared signals have.
-
-        Where the run's own timing replaced the plan's, an instrument's clock is known four times worse.
-        """
-        path = context.timing
-        if is_lost(path):
-            return _LIMITS.clocks_lost
-        return 1 if path is None or path.verdict == "no_gap" else 2
-
-    def clock_share(self, context: Context) -> float:
-        """Return the share of its clocks' normal mismatch that is left after they were set."""
-        return 1.0
-
-    def learn(self, context: Context, judged: FittedVerdict) -> Context:
-        """Return what is known to later links after this one was judged."""
-        return context

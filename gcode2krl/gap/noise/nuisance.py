@@ -17,6 +17,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect
 from gcode2krl.effects.effect import LINKS, NO_TARGET
 from gcode2krl.effects.mismatch import Mismatch, sigma
+from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.gap.compare.links import CLOCK, clock_columns, time_law_columns
 from gcode2krl.gap.compare.trace import Trace, unmeasured_at
 from gcode2krl.gap.components import Block, Signatures, blocks_of
@@ -142,7 +143,7 @@ def _of_instruments(
     effect = next((each for each in library.values() if each.is_clock), None)
     block = None if effect is None else Block(effect, trace.link.clock)
     # within the clock's deviation of a kink, and between two samples, either rate may hold
-    sample_s = float(np.median(np.diff(trace.inputs.time_s))) if len(trace.inputs.time_s) > 1 else 0.0
+    sample_s = usual_step_s(trace.inputs.time_s) if len(trace.inputs.time_s) > 1 else 0.0
     unsure_s = 0.5 * np.hypot(sigma(mismatch.clock_s) * clock, sigma(sample_s / 2.0))
     yield Nuisance(CLOCK, False, clock_columns(trace, mismatch) * clock, block, missed=trace.kinks * unsure_s)
     if trace.link.has_time_law(upstream):

@@ -24,6 +24,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.core import FLOATS, INT, INTS, OUT_FLOATS, core_function
+from gcode2krl.gap.compare.interpolation import rms
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _gains = core_function("gap_gains", *(FLOATS, FLOATS, OUT_FLOATS, FLOATS), *(OUT_FLOATS,) * 3, returns=INT)
@@ -201,7 +202,7 @@ def fit(
     lagged, windows = _lagged(residuals, order)
     if len(lagged) < _LIMITS.noise_least_rows:
         values = np.concatenate([values for values, _ in residuals]) if residuals else np.zeros(1)
-        return white(max(float(np.sqrt(np.mean(values**2))), floor))
+        return white(max(rms(values), floor))
     if not every_row:
         lagged = lagged[calm_rows(lagged, windows, floor)]
     products = lagged.T @ lagged / len(lagged)
@@ -209,14 +210,14 @@ def fit(
         drawn, _ = _lagged(slow, order)
         products = products - _share_off(products, drawn) * (drawn.T @ drawn) / len(drawn)
     power = float(products[0, 0])
-    rms = max(float(np.sqrt(power)), floor)
+    sigma = max(float(np.sqrt(power)), floor)
     # a tenth of the floor's power: colour is not learnt from the rounding of decimals
     x, y = products[1:, 1:], products[1:, 0]
     ridge = 1e-6 * float(np.trace(x)) + floor**2 * 0.1 + 1e-30
     a = _stable(np.asarray(np.linalg.solve(x + ridge * np.eye(order), y), dtype=np.float64))
     left = float(products[0, 0] - 2.0 * a @ y + a @ x @ a)
     scale = max(float(np.sqrt(max(left, 0.0))), _LIMITS.noise_least_scale * floor)
-    return Noise(a, scale, max(rms, scale))
+    return Noise(a, scale, max(sigma, scale))
 
 
 def _lagged(residuals: Sequence[tuple[Floats, Ints]], order: int) -> tuple[Floats, Ints]:

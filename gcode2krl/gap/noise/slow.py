@@ -24,6 +24,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.core import FLOATS, INTS, OUT_FLOATS, core_function
 from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.compare.interpolation import rms
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.noise.nuisance import Nuisance
 from gcode2krl.gap.noise.short import innovation_gains, innovations
@@ -216,7 +217,7 @@ def slow_parts_of(means: BlockMeans, floor: float = 0.0) -> tuple[SlowPart, ...]
 def _seen(means: BlockMeans, basis: Floats) -> float:
     """Return the rms of the data beside a basis: slow noise is never more, however few its waves."""
     rest = means.values - basis @ (basis.T @ means.values)
-    return float(np.sqrt(np.mean(rest**2)))
+    return rms(rest)
 
 
 def _explained(fit: "_Fit", basis: Floats, peak: _Peak) -> tuple[Floats, _Peak]:

@@ -19,7 +19,7 @@ from scipy.sparse import csc_array, identity
 
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
-from gcode2krl.gap.compare.interpolation import nearest_rows, resolution, usual_deviation
+from gcode2krl.gap.compare.interpolation import nearest_rows, resolution, rms, usual_deviation, usual_step_s
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.noise.nuisance import Nuisance
 from gcode2krl.gap.noise.short import (
@@ -120,7 +120,7 @@ def _spikes(trace: Trace, rest: Floats) -> Floats:
     slow.
     """
     time_s = trace.time_s
-    length = max(1, round(_LEVEL_S / float(np.median(np.diff(time_s)))))
+    length = max(1, round(_LEVEL_S / usual_step_s(time_s)))
     count = len(time_s) // length
     if count < 2 * _LEVELS:
         return np.zeros_like(rest)
@@ -140,7 +140,7 @@ def _spikes(trace: Trace, rest: Floats) -> Floats:
 
 def _of_rows(parts: Sequence[SlowPart], trace: Trace) -> tuple[Slow, ...]:
     """Return slow parts as processes of a trace's rows."""
-    step_s = float(np.median(np.diff(trace.time_s)))
+    step_s = usual_step_s(trace.time_s)
     return tuple(Slow(float(np.exp(-step_s / part.time_constant_s)), part.sigma) for part in parts)
 
 
@@ -360,7 +360,7 @@ def _learnt(
     traces: Sequence[Trace], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]]
 ) -> float:
     if is_revisited(traces):
-        return _rms(revisits(traces))
+        return rms(revisits(traces))
     values = sum(trace.measured.size for trace in traces)
     rests, spanned = [], 0
     for trace, own, others in zip(traces, signatures, nuisance, strict=True):
@@ -370,7 +370,7 @@ def _learnt(
         spanned += basis.shape[1]
     if 3 * (values - spanned) < values:
         return _few(traces, signatures, nuisance)
-    return _rms(np.concatenate(rests)) * float(np.sqrt(values / (values - spanned)))
+    return rms(np.concatenate(rests)) * float(np.sqrt(values / (values - spanned)))
 
 
 def _few(
@@ -385,7 +385,7 @@ def _few(
     turned, variances = (
         np.concatenate(each) for each in zip(*_turned(traces, signatures, nuisance), strict=True)
     )
-    sigmas = _rms(turned[:, -1]) * _SIGMAS
+    sigmas = rms(turned[:, -1]) * _SIGMAS
     count, taken = len(turned), list[int]()
     while True:
         whole, beside = _costs(turned, variances, sigmas, taken)
@@ -433,10 +433,6 @@ def _flat(columns: Sequence[Floats]) -> Floats:
     return joined.reshape(joined.shape[0] * joined.shape[1], joined.shape[2])
 
 
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def _basis(columns: Floats) -> Floats:
     """Return an orthonormal basis (v, r) of what columns (v, c) span."""
     scale = np.linalg.norm(columns, axis=0)
@@ -469,7 +465,7 @@ def strongest_moments(traces: Sequence[Trace], low_s: float, high_s: float) -> t
 
 def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
     """Return rows and sizes of the clearest jumps of a trace, not two of them within a window's half."""
-    step_s = float(np.median(np.diff(trace.time_s)))
+    step_s = usual_step_s(trace.time_s)
     half = max(3, round(half_s / step_s))
     if len(trace.time_s) < 2 * half:
         return []

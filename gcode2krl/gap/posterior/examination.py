@@ -38,7 +38,7 @@ from gcode2krl.effects.effect import JOINTS
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
 from gcode2krl.gap.compare.events import command_changes
-from gcode2krl.gap.compare.interpolation import values_of
+from gcode2krl.gap.compare.interpolation import rms, usual_step_s, values_of
 from gcode2krl.gap.compare.links import SIGNALS
 from gcode2krl.gap.compare.trace import Context, Link, Trace, stretches_of, stretches_of_all
 from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_from, blocks_of, strongest_hz
@@ -216,7 +216,7 @@ def _loud_in_step(likelihood: Likelihood, left: Sequence[Floats]) -> float:
         return 0.0
     changes = [_by_moments(command_changes(each).astype(np.float64), each) for each in traces]
     is_changing = np.asarray(np.concatenate(changes).any(axis=1), dtype=np.bool_)
-    moment_s = _MOMENT_ROWS * max(float(np.median(np.diff(trace.time_s))) for trace in traces)
+    moment_s = _MOMENT_ROWS * max(usual_step_s(trace.time_s) for trace in traces)
     shares = [0.0]
     for j in range(len(noise)):
         rows = [
@@ -385,7 +385,7 @@ class PlaceTimes:
     def size(self, applied: Sequence[Applied]) -> float:
         """Return the rms by which runs are late beside a plan, in s; infinite where there is none."""
         try:
-            return float(np.sqrt(np.mean(self.late(applied) ** 2)))
+            return rms(self.late(applied))
         except Gcode2KrlError:
             return np.inf
 
@@ -461,7 +461,7 @@ def _blocks(
         yield from blocks_of(effect, target)
         return
     residuals = [trace.residual for trace in traces]
-    step_s = float(np.median(np.diff(traces[0].time_s)))
+    step_s = usual_step_s(traces[0].time_s)
     peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)
     duration_s = float(traces[0].time_s[-1] - traces[0].time_s[0])
     yield from blocks_at(effect, target, peaks, (p.high - p.low) * duration_s)
@@ -604,7 +604,7 @@ class Examination:
     @property
     def accepted_keys(self) -> frozenset[Key]:
         """Return names and targets of the accepted effects."""
-        return frozenset((each.effect.name, each.target) for each in self.applied)
+        return frozenset(applied.key for applied in self.applied)
 
     def without(self, number: int) -> tuple[Applied, ...]:
         """Return the accepted effects but one."""

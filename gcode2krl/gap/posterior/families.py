@@ -31,10 +31,11 @@ from scipy.sparse import csr_array
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects.dependence import Dependence
+from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.gap.compare.trace import Trace, stretches_of_all
 from gcode2krl.gap.components import Place
 from gcode2krl.gap.noise.slow import sums_between
-from gcode2krl.gap.posterior.gram import MOST, SplitColumns, UsedColumns, boxed, gain_inflation
+from gcode2krl.gap.posterior.gram import SplitColumns, UsedColumns, boxed, gain_inflation
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -68,7 +69,7 @@ class Rows:
     @property
     def step_s(self) -> float:
         """Return the time between blocks."""
-        return float(np.median(np.diff(self.traces[0].time_s[self.starts[0]])))
+        return usual_step_s(self.traces[0].time_s[self.starts[0]])
 
     def of(self, columns: Sequence[Floats], component: int | None = None) -> Floats:
         """Return columns (k, n, c) of each trace whitened and in blocks, (v, c).
@@ -123,7 +124,7 @@ class Rows:
 
 def _block_starts(trace: Trace) -> Ints:
     """Return the first rows of blocks; none reaches over a gap of the data."""
-    step_s = float(np.median(np.diff(trace.time_s)))
+    step_s = usual_step_s(trace.time_s)
     length = max(1, int(1.0 / (THRESHOLDS.families.rows_hz * step_s) + 1e-6))
     return np.concatenate([np.arange(first, last, length) for first, last in trace.segments])
 
@@ -311,12 +312,6 @@ class View:
     def moved_cross(self) -> Floats:
         """(moves, t + m) Fᵀ times each."""
         return self.moved @ self.fixed
-
-    @cached_property
-    def is_within(self) -> bool:
-        """Tell whether no nuisance would leave its bounds, so that they need not be watched."""
-        b = self.solved(self.cross)[self.tangents.shape[1] :]
-        return bool(np.all(np.abs(b) < MOST))
 
     @cached_property
     def chi2(self) -> float:

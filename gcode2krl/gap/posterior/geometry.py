@@ -10,6 +10,7 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Applied, Effect, Inputs, commanded
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.compare.interpolation import rms
 from gcode2krl.gap.compare.links import SurfaceLink, SurfacePoints
 from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.trace import Context
@@ -67,7 +68,7 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmG
         for pair, table in zip(pairs[:explaining], tables, strict=False)
     ]
     good: Bools = ~fit.is_outlier
-    before_mm = float(np.sqrt(np.mean(np.concatenate(raw)[good] ** 2)))
+    before_mm = rms(np.concatenate(raw)[good])
     if left * before_mm > _FIT_LIMITS.poses_mostly_frames * fit.rms_before_mm:
         return None
     most = _FIT_LIMITS.poses_geometry_share * min(left * before_mm, fit.rms_before_mm)

@@ -338,12 +338,8 @@ def _settled(found: Examination) -> tuple[Examination, dict[int, list[Rival]], d
         swapped = with_rival(found, number, best.applied)
         if swapped is None or swapped.cost >= found.cost:
             return found, rivals, swaps
-        swaps[_key(found.applied[number])] = best.applied
+        swaps[found.applied[number].key] = best.applied
         found = swapped
-
-
-def _key(applied: Applied) -> Key:
-    return applied.effect.name, applied.target
 
 
 def _with_impulses(judged: Judgement) -> Judgement:
@@ -439,16 +435,14 @@ class _Trial:
 
     def size(self, count: int) -> Size:
         """Return the size of the held-out gap with those of its effects that are among the first causes."""
-        causes = self.chosen.causes
-        if count < len(self.main.causes):
-            names = [(each.effect.name, each.target) for each in self.main.causes[:count]]
-            causes = tuple(each for each in causes if (each.effect.name, each.target) in names)
-        return _size(self.chosen, self.held, causes)
+        if count >= len(self.main.causes):
+            return _size(self.chosen, self.held, self.chosen.causes)
+        return self.size_with(self.main.causes[:count])
 
     def size_with(self, named: Sequence[Applied]) -> Size:
         """Return the size of the held-out gap with those of its effects that bear these names."""
-        names = [(each.effect.name, each.target) for each in named]
-        causes = [each for each in self.chosen.causes if (each.effect.name, each.target) in names]
+        keys = [applied.key for applied in named]
+        causes = [applied for applied in self.chosen.causes if applied.key in keys]
         return _size(self.chosen, self.held, causes)
 
 
@@ -466,7 +460,7 @@ def _trials(found: Examination, held: Sequence[Trace], swaps: Mapping[Key, Appli
     for train, test in folds_of(found.traces, power):
         chosen = examine(found.link, train, found.question, found.data.known, found.noise)
         for key, rival in swaps.items():
-            number = next((i for i, each in enumerate(chosen.applied) if _key(each) == key), None)
+            number = next((i for i, each in enumerate(chosen.applied) if each.key == key), None)
             chosen = (None if number is None else with_rival(chosen, number, rival)) or chosen
         yield _Trial(chosen, test, found)
 
@@ -590,7 +584,7 @@ def _held_out(
     gone = max(0.0, after - before)
     applied = found.applied[number]
     folds = [trial for trial in trials if trial.chosen is not found]
-    agreeing = sum((applied.effect.name, applied.target) in trial.chosen.accepted_keys for trial in folds)
+    agreeing = sum(applied.key in trial.chosen.accepted_keys for trial in folds)
     return HeldOut(
         agreeing / len(folds) if folds else None,
         gone / max(1.0 - before, _LEAST_REST),

@@ -34,6 +34,7 @@ from gcode2krl.effects import Applied, Inputs
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Gcode2KrlError
+from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.gap.compare.pair import Simulator
 from gcode2krl.gap.compare.trace import Context, Trace
 from gcode2krl.gap.components import Grid, Place, Signatures
@@ -144,7 +145,7 @@ def _in_all(own: Foretold, component: int, k: int) -> Foretold:
 
 def _every(trace: Trace) -> Ints:
     """Return rows of a trace that are far enough apart to count as independent."""
-    step_s = float(np.median(np.diff(trace.time_s))) if len(trace.time_s) > 1 else _LIMITS.trial_step_s
+    step_s = usual_step_s(trace.time_s) if len(trace.time_s) > 1 else _LIMITS.trial_step_s
     return np.arange(0, len(trace.time_s), max(1, round(_LIMITS.trial_step_s / max(step_s, 1e-9))))
 
 

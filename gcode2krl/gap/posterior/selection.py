@@ -217,13 +217,9 @@ def twins_of(
     """
     best: dict[Key, Twin] = {}
     for twin in _alike(found, applied, others, tried):
-        if twin.share > best.setdefault(_twin_key(twin), twin).share:
-            best[_twin_key(twin)] = twin
+        if twin.share > best.setdefault(twin.start.key, twin).share:
+            best[twin.start.key] = twin
     return sorted(best.values(), key=lambda twin: -twin.share)[: _LIMITS.most_twins]
-
-
-def _twin_key(twin: Twin) -> Key:
-    return twin.start.effect.name, twin.start.target
 
 
 def _alike(
@@ -234,7 +230,7 @@ def _alike(
     allowed = [
         column
         for column in candidates.columns
-        if candidates.block(column).key not in {*tried, (applied.effect.name, applied.target)}
+        if candidates.block(column).key not in {*tried, applied.key}
         and not candidates.block(column).effect.plans_anew
         and (column.bent or not applied.effect.is_linear)
     ]
@@ -384,7 +380,7 @@ def with_rival(found: Examination, number: int, rival: Applied) -> Examination |
     """Return the examination with a rival in place of an accepted effect; None where it fails a test."""
     others = refit(found.likelihood, found.without(number), steps=_PRUNING_STEPS)
     before = found.dropping(number, others)
-    key, candidates = (rival.effect.name, rival.target), found.data.candidates
+    key, candidates = rival.key, found.data.candidates
     column = next((each for each in candidates.columns if candidates.block(each).key == key), None)
     if column is None:
         return None
@@ -619,7 +615,7 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
     residual = found.likelihood.residual(found.applied)
     rivals: dict[Key, Rival] = {}
     for start in itertools.chain(_rival_twins(found, number), _of_gain(found, number, gain, spread)):
-        if _key(start) in rivals or len(rivals) >= _LIMITS.most_rivals:
+        if start.key in rivals or len(rivals) >= _LIMITS.most_rivals:
             continue
         bent = not start.effect.is_linear
         fitted = refit(found.likelihood, (*others, start), steps=_STEPS, scan=bent)
@@ -629,12 +625,8 @@ def rivals_of(found: Examination, number: int) -> list[Rival]:
         cost = difference + fitted.occam - found.fitted.occam
         apart = found.likelihood.residual(fitted.applied) - residual
         distance2 = float(apart @ apart) / max(gain, 1e-300)
-        rivals[_key(start)] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
+        rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
-
-
-def _key(applied: Applied) -> Key:
-    return applied.effect.name, applied.target
 
 
 def _of_gain(found: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
