@@ -114,13 +114,13 @@ def blocks_at(
         return
     seen = set()
     for block in blocks_of(effect, target):
-        rest = {name: value for name, value in block.shape.items() if name != frequency.name}
+        others = {name: value for name, value in block.shape.items() if name != frequency.name}
         for value in frequencies_hz:
-            key = (value, *sorted(rest.items()))
+            key = (value, *sorted(others.items()))
             if key not in seen:
                 seen.add(key)
                 tried = max(1.0, looked_at / len(frequencies_hz))
-                yield Block(effect, target, rest | {frequency.name: value}, tried)
+                yield Block(effect, target, others | {frequency.name: value}, tried)
 
 
 def blocks_from(
@@ -204,11 +204,11 @@ class Signatures:
         parts = [self.columns(block, trace) for block in blocks]
         stack, first = unwritten((*trace.shape[::-1], sum(part.shape[2] for part in parts))), 0
         for block, key, part in zip(blocks, keys, parts, strict=True):
-            own = stack[:, :, first : first + part.shape[2]]
+            place = stack[:, :, first : first + part.shape[2]]
             for j, column in np.argwhere(part.any(axis=1)).tolist():
-                own[j, :, column] = part[j, :, column]
+                place[j, :, column] = part[j, :, column]
             if block.tried == 1.0:
-                self._by_trace[trace][key] = own
+                self._by_trace[trace][key] = place
             first += part.shape[2]
         self._stacks[trace] = keys, stack
         return stack
@@ -289,7 +289,8 @@ def smooth_sum(inputs: Sequence[Floats]) -> Functions:
     if not used:
         return smooth([np.zeros(len(each)) for each in inputs])
     columns = tuple(
-        np.concatenate(each, axis=1) for each in zip(*(part.columns for part in used), strict=True)
+        np.concatenate(parts_of_trace, axis=1)
+        for parts_of_trace in zip(*(part.columns for part in used), strict=True)
     )
     return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
 
@@ -301,10 +302,10 @@ def _smooth(inputs: Sequence[Floats], groups: Sequence[Floats], count: int) -> F
     knots = np.linspace(low, high, _LIMITS.knots)
     hats = [np.maximum(0.0, 1.0 - np.abs(each[:, None] - knots) / (knots[1] - knots[0])) for each in inputs]
     columns: list[Floats] = []
-    for own, group in zip(hats, groups, strict=True):
-        wide = np.zeros((len(own), count, len(knots)))
-        wide[np.arange(len(own)), group] = own
-        columns.append(wide.reshape(len(own), -1))
+    for hat, group in zip(hats, groups, strict=True):
+        wide = np.zeros((len(hat), count, len(knots)))
+        wide[np.arange(len(hat)), group] = hat
+        columns.append(wide.reshape(len(hat), -1))
     roots = [in_each(_root(length), count) for length in _LIMITS.lengths]
     return Functions(tuple(columns), tuple(roots))
 
@@ -350,8 +351,8 @@ def _powers(x: Floats, order: int) -> Floats:
 def products(first: Sequence[Floats], second: Sequence[Floats]) -> list[Floats]:
     """Return every product (n, a·b) of columns (n, a) and (n, b)."""
     return [
-        (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
-        for one, other in zip(first, second, strict=True)
+        (factor[:, :, None] * other[:, None, :]).reshape(len(factor), -1)
+        for factor, other in zip(first, second, strict=True)
     ]
 
 
@@ -386,8 +387,8 @@ class Place:
     def lifted(self, functions: Functions) -> tuple[list[Floats], tuple[Floats, ...]]:
         """Return columns (k, n, f·d) of functions at this place, and the roots of their covariances."""
         columns: list[Floats] = [
-            (own[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
-            for own, unit in zip(functions.columns, self.units, strict=True)
+            (function[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
+            for function, unit in zip(functions.columns, self.units, strict=True)
         ]
         directions = np.eye(self.width)
         roots = [np.asarray(np.kron(root, directions), dtype=np.float64) for root in functions.roots]
@@ -452,8 +453,8 @@ class Grid:
         """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``."""
         sigma = float(np.mean(self._sigma))
         return tuple(
-            sigma * own.as_stated(each)[:, list(own.trace.columns)].T[:, :, None]
-            for own, each in zip(self.inputs, vectors, strict=True)
+            sigma * inputs.as_stated(vector)[:, list(inputs.trace.columns)].T[:, :, None]
+            for inputs, vector in zip(self.inputs, vectors, strict=True)
         )
 
     def _own_joints(self) -> Iterator[Place]:
@@ -487,16 +488,16 @@ class Grid:
     # Functions at a place
 
     def _functions(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
-        own = self.inputs
+        inputs = self.inputs
         yield from self._of_time
         yield from self._of_motion(place)
         yield self._of_travel
         if place.joint is not None:
             yield from self._of_joint(place.joint)
-        if any(each.force_N.any() for each in own):
+        if any(each.force_N.any() for each in inputs):
             yield from self._of_force
         if place.joint is None:
-            yield Dependence.PLACE, smooth_sum([each.position_mm for each in own])
+            yield Dependence.PLACE, smooth_sum([each.position_mm for each in inputs])
         if place.where is Where.FORCE_AXIS:
             yield Dependence.PLACE, free(self._pose(turned=True))
         elif place.where is Where.JOINT:
@@ -521,40 +522,45 @@ class Grid:
         return list(self._functions_of_time())
 
     def _functions_of_time(self) -> Iterator[tuple[Dependence, Functions]]:
-        own, count = self.inputs, len(self.inputs)
-        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in own])
-        yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in own])
+        inputs, count = self.inputs, len(self.inputs)
+        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in inputs])
+        yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in inputs])
         if count > 1:
-            runs = [np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(own)]
+            runs = [
+                np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(inputs)
+            ]
             yield Dependence.RUN_TO_RUN, free(runs)
-        grown = [np.stack([-np.expm1(-each.hours / tau) for tau in _WARMS_H], axis=1) for each in own]
+        grown = [np.stack([-np.expm1(-each.hours / tau) for tau in _WARMS_H], axis=1) for each in inputs]
         yield Dependence.WALL_CLOCK, free(grown)
-        yield Dependence.RUN_START, smooth([each.since_start_s for each in own])
-        if any(each.spindle.any() for each in own):
-            yield Dependence.SPINDLE_SPEED, free([each.spindle for each in own])
-        if any(each.temperature_C.any() for each in own):
-            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in own])
+        yield Dependence.RUN_START, smooth([each.since_start_s for each in inputs])
+        if any(each.spindle.any() for each in inputs):
+            yield Dependence.SPINDLE_SPEED, free([each.spindle for each in inputs])
+        if any(each.temperature_C.any() for each in inputs):
+            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in inputs])
 
     def _of_motion(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
-        own = self.inputs
+        inputs = self.inputs
         if place.joint is not None:
-            yield Dependence.VELOCITY, smooth([each.rate_rad_s[:, place.joint] for each in own])
-            yield Dependence.ACCELERATION, smooth([each.acceleration_rad_s2[:, place.joint] for each in own])
+            yield Dependence.VELOCITY, smooth([each.rate_rad_s[:, place.joint] for each in inputs])
+            yield (
+                Dependence.ACCELERATION,
+                smooth([each.acceleration_rad_s2[:, place.joint] for each in inputs]),
+            )
             if self.traces[0].link.of_joints:  # behind the arm's modes a jerk is no function any more
-                yield Dependence.JERK, free([each.jerk(place.joint) for each in own])
+                yield Dependence.JERK, free([each.jerk(place.joint) for each in inputs])
             return
-        velocity = [each.velocity_mm_s for each in own]
+        velocity = [each.velocity_mm_s for each in inputs]
         speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]
         along = [v / np.maximum(s, 1.0) for v, s in zip(velocity, speed, strict=True)]
         joined = [np.concatenate(each, axis=1) for each in zip(velocity, along, speed, strict=True)]
         yield Dependence.VELOCITY, free(joined)
-        yield Dependence.ACCELERATION, free([each.acceleration_mm_s2 for each in own])
+        yield Dependence.ACCELERATION, free([each.acceleration_mm_s2 for each in inputs])
 
     def _of_joint(self, joint: int) -> Iterator[tuple[Dependence, Functions]]:
-        own = self.inputs
-        angle = [each.q_rad[:, joint] for each in own]
+        inputs = self.inputs
+        angle = [each.q_rad[:, joint] for each in inputs]
         yield Dependence.OWN_ANGLE, smooth(angle)
-        yield Dependence.REVERSALS, free([each.reversals(joint) for each in own])
+        yield Dependence.REVERSALS, free([each.reversals(joint) for each in inputs])
         ratios = self.traces[0].inputs.cell.robot.drives.gear_ratio
         if ratios is not None and ratios[joint] != 0.0:
             orders = ratios[joint] * np.arange(1, _LIMITS.harmonics + 1)
@@ -563,26 +569,26 @@ class Grid:
                 Dependence.MOTOR_ANGLE,
                 free([np.concatenate([np.cos(each), np.sin(each)], axis=1) for each in turned]),
             )
-        if any(each.torque_Nm[:, joint].any() for each in own):
-            loops = [each.torque_with_memory(joint) for each in own]
-            single = odd([each.torque_Nm[:, joint] for each in own])
+        if any(each.torque_Nm[:, joint].any() for each in inputs):
+            loops = [each.torque_with_memory(joint) for each in inputs]
+            single = odd([each.torque_Nm[:, joint] for each in inputs])
             # the weight of the links is part of the first; the force alone is what bends the arm
-            loads = odd([each.load_torque_Nm[:, joint] for each in own])
+            loads = odd([each.load_torque_Nm[:, joint] for each in inputs])
             joined = [np.concatenate(each, axis=1) for each in zip(single, loops, loads, strict=True)]
             yield Dependence.OWN_TORQUE, free(joined)
 
     def _functions_of_force(self) -> Iterator[tuple[Dependence, Functions]]:
-        own = self.inputs
-        force = [each.force_N for each in own]
+        inputs = self.inputs
+        force = [each.force_N for each in inputs]
         size = [np.linalg.norm(each, axis=1, keepdims=True) for each in force]
         most = max(float(each.max()) for each in size)
         unit = [f / np.maximum(s, 1e-3 * most) for f, s in zip(force, size, strict=True)]
         bent = [f * s / most for f, s in zip(force, size, strict=True)]
         columns = [np.concatenate(each, axis=1) for each in zip(force, bent, unit, size, strict=True)]
         yield Dependence.FORCE, free(columns)
-        place_ = polynomials([each.position_mm for each in own], 1)
+        place_ = polynomials([each.position_mm for each in inputs], 1)
         yield Dependence.FORCE_BY_PLACE, free(products(force, place_))
-        cut = polynomials([each.cut_m[:, None] for each in own], 2)
+        cut = polynomials([each.cut_m[:, None] for each in inputs], 2)
         grows = products(force, [each[:, 1:] for each in cut])
         yield (
             Dependence.METRES_CUT,
@@ -608,7 +614,7 @@ class Grid:
         yield Family(place, Dependence.VELOCITY, late, tuple(np.eye(late[0].shape[2])[:, :, None]))
         loops = [each.with_memory for each in self.inputs]
         wide = [
-            np.einsum("knc,kj->knjc", each, np.eye(len(each))).reshape(*each.shape[:2], -1) for each in loops
+            np.einsum("knc,kj->knjc", loop, np.eye(len(loop))).reshape(*loop.shape[:2], -1) for loop in loops
         ]
         used = np.concatenate(wide, axis=1).any(axis=(0, 1))
         if used.any():
@@ -617,12 +623,12 @@ class Grid:
 
     def _of_the_plan(self, place: Place) -> Iterator[Family]:
         """Yield what a controller makes of corners, speeds and stops by laws of its own."""
-        own, at = self.inputs, list(self.traces[0].columns)
+        inputs, at = self.inputs, list(self.traces[0].columns)
         sigma = float(np.mean(self._sigma))
-        late, _ = place.lifted(free([each.late_by_rounding for each in own]))
-        beside = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in own]
-        yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(beside, sigma)]))
-        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in own])))
+        late, _ = place.lifted(free([each.late_by_rounding for each in inputs]))
+        rounded = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in inputs]
+        yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(rounded, sigma)]))
+        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in inputs])))
         yield Family(place, Dependence.STOPS, *place.lifted(free(self._passed)))
 
     @property
@@ -631,16 +637,16 @@ class Grid:
         programs: dict[bytes, int] = {}
         numbers: list[int] = []
         widths: list[int] = []
-        for each in self.inputs:
-            targets = each.trace.inputs.targets
+        for inputs in self.inputs:
+            targets = inputs.trace.inputs.targets
             key = b"" if targets is None else targets.position_mm.tobytes()
             numbers.append(programs.setdefault(key, len(programs)))
             if len(programs) > len(widths):
-                widths.append(each.corners_passed.shape[1])
+                widths.append(inputs.corners_passed.shape[1])
         firsts = np.cumsum([0, *widths])
         columns = [np.zeros((len(each.corners_passed), firsts[-1])) for each in self.inputs]
-        for number, wide, each in zip(numbers, columns, self.inputs, strict=True):
-            wide[:, firsts[number] : firsts[number + 1]] = each.corners_passed
+        for number, wide, inputs in zip(numbers, columns, self.inputs, strict=True):
+            wide[:, firsts[number] : firsts[number + 1]] = inputs.corners_passed
         return columns
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
@@ -649,10 +655,10 @@ class Grid:
         tool, arm_, bends = [], [], []
         at = list(self.traces[0].columns)
         sigma = float(np.mean(self._sigma))
-        for each in self.inputs:
-            tool.append(np.moveaxis(each.tool_axes[:, at], 1, 0) * sigma)
-            arm_.append(np.moveaxis(each.jacobian[:, at], 1, 0))
-            bends.append(arm_[-1] * each.load_torque_Nm)
+        for inputs in self.inputs:
+            tool.append(np.moveaxis(inputs.tool_axes[:, at], 1, 0) * sigma)
+            arm_.append(np.moveaxis(inputs.jacobian[:, at], 1, 0))
+            bends.append(arm_[-1] * inputs.load_torque_Nm)
         with_arm = [columns, tool, _scaled(arm_, sigma)]
         yield Family(place, Dependence.PLACE, *_joined(with_arm))
         if any(each.any() for each in bends):
@@ -666,9 +672,9 @@ class Grid:
 
 def _is_alike(first: Sequence[Floats], second: Sequence[Floats]) -> bool:
     """Tell whether units (k, n, 1) of each trace are along one line, to a tenth of their length."""
-    one, other = (np.concatenate(each, axis=1)[:, :, 0] for each in (first, second))
-    whole = np.sum(one**2) * np.sum(other**2)
-    return bool(np.sum(one * other) ** 2 > 0.99 * whole)
+    vector, other = (np.concatenate(each, axis=1)[:, :, 0] for each in (first, second))
+    whole = np.sum(vector**2) * np.sum(other**2)
+    return bool(np.sum(vector * other) ** 2 > 0.99 * whole)
 
 
 def _scaled(columns: Sequence[Floats], size: float) -> list[Floats]:

@@ -115,11 +115,11 @@ def _diagnosed(context: Context, begin: Begin) -> Gap:
     tip = next((link for link in gap.links if link.link == MECHANICS.name), None)
     if tip is not None and tip.verdict == "explained":  # one error alone keeps its own name
         return gap
-    left = tip.rms_after / tip.rms_before if tip is not None and tip.rms_before > 0.0 else 1.0
-    found = geometry_of_arm(context.pairs, context.explaining, left)
-    if found is None:
+    share_left = tip.rms_after / tip.rms_before if tip is not None and tip.rms_before > 0.0 else 1.0
+    arm = geometry_of_arm(context.pairs, context.explaining, share_left)
+    if arm is None:
         return gap
-    return with_geometry(gap, _answered(context.with_pairs(found.pairs), begin), found)
+    return with_geometry(gap, _answered(context.with_pairs(arm.pairs), begin), arm)
 
 
 def _answered(context: Context, begin: Begin) -> Gap:
@@ -167,12 +167,12 @@ def _rows(traces: Sequence[Trace]) -> int:
 
 def _of_long_runs(shares: Mapping[str, float]) -> list[Issue]:
     """Return a note on the links of which a share of the rows alone was judged."""
-    told = [f"{link} {share:.0%}" for link, share in shares.items() if share < 1.0]
+    shortened = [f"{link} {share:.0%}" for link, share in shares.items() if share < 1.0]
     words = (
         f"the runs are long: judged are evenly spread windows of {THRESHOLDS.beside.judged_window_s:g} s, of "
-        f"the rows of {', '.join(told)}; events are sought in all of them"
+        f"the rows of {', '.join(shortened)}; events are sought in all of them"
     )
-    return [Issue("note", "run-long", 0, words)] if told else []
+    return [Issue("note", "run-long", 0, words)] if shortened else []
 
 
 def _nothing_compared(gap: Gap, context: Context) -> Issue:

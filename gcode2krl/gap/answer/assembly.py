@@ -99,10 +99,10 @@ def _depends(largest: Judgement, unexplained: Unexplained) -> Depends | None:
     if largest.applied:
         cause = largest.applied[0]
         return Depends(cause.target if cause.target in JOINTS else None, cause.effect.depends_on)
-    for found in unexplained.depends_on:
-        if found.link == largest.link.name:
-            at = found.at if found.at in JOINTS else None
-            return Depends(at, frozenset(each for each in Dependence if each.value == found.on))
+    for dependence in unexplained.depends_on:
+        if dependence.link == largest.link.name:
+            at = dependence.at if dependence.at in JOINTS else None
+            return Depends(at, frozenset(each for each in Dependence if each.value == dependence.on))
     return None
 
 
@@ -258,10 +258,12 @@ def _dependences(signals: Sequence[Judgement]) -> Iterator[tuple[DependsOnResult
     """Yield on what depends what is left of all links, the largest gap first; of a family what it says."""
     links: set[str] = set()
     for judgement in sorted(signals, key=_weight, reverse=True):
-        own: list[tuple[DependsOnResult, Evidence | None]] = [(each, None) for each in impulses_of(judgement)]
-        own += depends_on(judgement, larger_links=len(links | {each.link for each, _ in own}))
-        links |= {each.link for each, _ in own}
-        yield from own
+        of_link: list[tuple[DependsOnResult, Evidence | None]] = [
+            (each, None) for each in impulses_of(judgement)
+        ]
+        of_link += depends_on(judgement, larger_links=len(links | {each.link for each, _ in of_link}))
+        links |= {each.link for each, _ in of_link}
+        yield from of_link
 
 
 def _unexplained(largest: Judgement | None, families: Sequence[DependsOnResult] = ()) -> Unexplained:
@@ -269,8 +271,8 @@ def _unexplained(largest: Judgement | None, families: Sequence[DependsOnResult] 
     if largest is None:
         return Unexplained(rms=None, significant=False, structure="unknown")
     size = largest.told
-    left = bool(size.significant) and largest.verdict != "explained"
-    significant = left or any(each.link == largest.link.name for each in families)
+    is_left = bool(size.significant) and largest.verdict != "explained"
+    significant = is_left or any(each.link == largest.link.name for each in families)
     return Unexplained(
         rms=largest.factor * max(size.after, 0.0) ** 0.5,
         significant=significant,

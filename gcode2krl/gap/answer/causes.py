@@ -180,7 +180,7 @@ def course_of(
         number = int(np.argmax([np.ptp(each) for each in values]))
         inputs, values, run = [inputs[number]], [values[number]], traces[number].run
     deviation = np.concatenate(values)
-    told: tuple[float, Course] | None = None
+    best: tuple[float, Course] | None = None
     for components in zip(*inputs, strict=True):
         name, over_unit, _ = components[0]
         x = np.concatenate([each[2] for each in components])
@@ -189,10 +189,10 @@ def course_of(
         shown = float(
             sum(len(rows) * (y - deviation.mean()) ** 2 for rows, y in zip(bins, means, strict=True))
         )
-        if len(bins) > 1 and (told is None or shown > told[0]):
+        if len(bins) > 1 and (best is None or shown > best[0]):
             points = tuple((float(x[rows].mean()), float(y)) for rows, y in zip(bins, means, strict=True))
-            told = shown, Course(over=name, over_unit=over_unit, unit=unit, points=points, run=run)
-    return None if told is None else told[1]
+            best = shown, Course(over=name, over_unit=over_unit, unit=unit, points=points, run=run)
+    return None if best is None else best[1]
 
 
 def _bins(x: Floats) -> list[Ints]:
@@ -206,47 +206,47 @@ def _bins(x: Floats) -> list[Ints]:
     return [np.flatnonzero(number == each).astype(np.int64) for each in np.unique(number)]
 
 
-def _inputs(own: Admissible, on: Dependence, joint: int | None) -> list[_Input]:
+def _inputs(inputs: Admissible, on: Dependence, joint: int | None) -> list[_Input]:
     """Return the components of an input that a deviation can be drawn over."""
     if joint is not None:
-        of_joint = _of_joint(own, on, joint)
+        of_joint = _of_joint(inputs, on, joint)
         if of_joint is not None:
             return [of_joint]
     if on in (Dependence.RUN_TIME, Dependence.RUN_START):
-        return [("time in the run", "s", own.since_start_s)]
+        return [("time in the run", "s", inputs.since_start_s)]
     if on in (Dependence.WALL_CLOCK, Dependence.RUN_TO_RUN):
-        return [("time since the first run's start", "h", own.hours)]
+        return [("time since the first run's start", "h", inputs.hours)]
     if on is Dependence.TRAVEL:
-        return [("travel", "m", own.travel_mm / MM_PER_M)]
+        return [("travel", "m", inputs.travel_mm / MM_PER_M)]
     if on is Dependence.METRES_CUT:
-        return [("way cut", "m", own.cut_m)]
+        return [("way cut", "m", inputs.cut_m)]
     if on is Dependence.SPINDLE_SPEED:
-        return [("spindle speed", "1/min", S_PER_MIN / (2.0 * np.pi) * own.spindle[:, 0])]
+        return [("spindle speed", "1/min", S_PER_MIN / (2.0 * np.pi) * inputs.spindle[:, 0])]
     if on is Dependence.PLACE:
-        return _along("place", "mm", own.position_mm)
+        return _along("place", "mm", inputs.position_mm)
     if on is Dependence.VELOCITY:
-        return _along("velocity", "mm/s", own.velocity_mm_s)
+        return _along("velocity", "mm/s", inputs.velocity_mm_s)
     if on is Dependence.ACCELERATION:
-        return _along("acceleration", "mm/s²", own.acceleration_mm_s2)
+        return _along("acceleration", "mm/s²", inputs.acceleration_mm_s2)
     if on in (Dependence.FORCE, Dependence.FORCE_BY_PLACE):
-        return _along("force", "N", own.force_N)
+        return _along("force", "N", inputs.force_N)
     if on is Dependence.TEMPERATURE:
-        return [(f"temperature {i + 1}", "°C", each) for i, each in enumerate(own.temperature_C.T)]
+        return [(f"temperature {i + 1}", "°C", each) for i, each in enumerate(inputs.temperature_C.T)]
     return []
 
 
-def _of_joint(own: Admissible, on: Dependence, joint: int) -> _Input | None:
+def _of_joint(inputs: Admissible, on: Dependence, joint: int) -> _Input | None:
     name = f"A{joint + 1}"
     if on is Dependence.OWN_ANGLE:
-        return f"angle of {name}", "deg", DEG_PER_RAD * own.q_rad[:, joint]
+        return f"angle of {name}", "deg", DEG_PER_RAD * inputs.q_rad[:, joint]
     if on is Dependence.OWN_TORQUE:
-        return f"torque of {name}", "Nm", own.torque_Nm[:, joint]
+        return f"torque of {name}", "Nm", inputs.torque_Nm[:, joint]
     if on is Dependence.VELOCITY:
-        return f"velocity of {name}", "deg/s", DEG_PER_RAD * own.rate_rad_s[:, joint]
+        return f"velocity of {name}", "deg/s", DEG_PER_RAD * inputs.rate_rad_s[:, joint]
     if on is Dependence.ACCELERATION:
-        return f"acceleration of {name}", "deg/s²", DEG_PER_RAD * own.acceleration_rad_s2[:, joint]
+        return f"acceleration of {name}", "deg/s²", DEG_PER_RAD * inputs.acceleration_rad_s2[:, joint]
     if on is Dependence.JERK:
-        return f"jerk of {name}", "deg/s³", DEG_PER_RAD * own.jerk(joint)[:, 0]
+        return f"jerk of {name}", "deg/s³", DEG_PER_RAD * inputs.jerk(joint)[:, 0]
     return None
 
 
@@ -282,13 +282,13 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[De
         return
     if not (rest.worth_naming or rest.is_gap):
         return
-    for told in family_probabilities(rest, larger_links):
-        if told.probability >= _FAMILY_LIMITS.least_probability:
-            yield _result(judgement, told), told.evidence
+    for family in family_probabilities(rest, larger_links):
+        if family.probability >= _FAMILY_LIMITS.least_probability:
+            yield _result(judgement, family), family.evidence
 
 
-def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
-    evidence, traces = told.evidence, judgement.every
+def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
+    evidence, traces = family.evidence, judgement.every
     is_step = evidence.on is Dependence.RUN_TIME_STEP
     is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
     signals = evidence.signal
@@ -309,9 +309,9 @@ def _result(judgement: Judgement, told: FamilyProbability) -> DependsOnResult:
         at=_at(evidence, evidence.signal),
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
-        probability=told.probability,
-        share=told.features.share,
-        tests=told.features.as_dict(),
+        probability=family.probability,
+        share=family.features.share,
+        tests=family.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
         run=None if moment is None else traces[moment[0]].run,
         in_later_runs=evidence.stays if is_step else None,
@@ -391,7 +391,7 @@ def with_lateness(gap: Gap, late: Sequence[Late]) -> Gap:
     rms_s = float(np.sqrt(np.mean([each.rms_s**2 for each in late])))
     stamp_s = max(each.stamp_s for each in late)
     runs = tuple(
-        RunSize(run=each.run, rms_before=each.rms_s, rms_after=each.rms_s, held_out=False) for each in late
+        RunSize(run=run.run, rms_before=run.rms_s, rms_after=run.rms_s, held_out=False) for run in late
     )
     link = LinkResult(
         link=TIMING.name,
@@ -432,15 +432,15 @@ def with_lateness(gap: Gap, late: Sequence[Late]) -> Gap:
 GEOMETRY = "geometry"
 
 
-def with_geometry(gap: Gap, rest: Gap, found: ArmGeometry) -> Gap:
-    """Return an answer with geometry as its first cause; ``rest`` is the answer to the runs without it."""
-    noise = next((link.floor for link in rest.links if link.link == MECHANICS.name), None)
-    shrink = _shrink(found, noise or 0.0)
+def with_geometry(gap: Gap, without_arm: Gap, arm: ArmGeometry) -> Gap:
+    """Return an answer with geometry as its first cause; ``without_arm`` answers to the runs without it."""
+    noise = next((link.floor for link in without_arm.links if link.link == MECHANICS.name), None)
+    shrink = _shrink(arm, noise or 0.0)
     parts = {
         f"{part.name.replace(' ', '_')}_{part.unit}": Interval(
             part.estimate.value, part.estimate.low, part.estimate.high
         )
-        for part in found.fit.told
+        for part in arm.fit.told
     }
     cause = CauseResult(
         effect=GEOMETRY,
@@ -449,10 +449,10 @@ def with_geometry(gap: Gap, rest: Gap, found: ArmGeometry) -> Gap:
         probability=THRESHOLDS.tell.geometry_probability,
         parameters=parts,
         shrink=shrink,
-        rms_after=found.after_mm,
+        rms_after=arm.after_mm,
     )
-    verdict = "explained" if rest.verdict == "no_gap" else "partly_explained"
-    before, after = found.before_mm, found.after_mm
+    verdict = "explained" if without_arm.verdict == "no_gap" else "partly_explained"
+    before, after = arm.before_mm, arm.after_mm
     size = replace(gap.gap, rms_before=before, rms_after=after, shrink=shrink, held_out=True)
     at_part = AtPart(
         what="tip", unit="mm", rms_before=before, rms_after=after, noise=None, link=MECHANICS.name
@@ -460,36 +460,36 @@ def with_geometry(gap: Gap, rest: Gap, found: ArmGeometry) -> Gap:
     return replace(
         gap,
         verdict=verdict,
-        gap=replace(size, max_after=rest.gap.max_after),
+        gap=replace(size, max_after=without_arm.gap.max_after),
         at_part=at_part,
         links=tuple(
             replace(link, rms_before=before, rms_after=after, verdict=verdict)
             if link.link == MECHANICS.name
             else link
-            for link in rest.links
+            for link in without_arm.links
         ),
-        causes=(cause, *rest.causes),
-        unexplained=rest.unexplained,
-        next_run=rest.next_run,
-        named=rest.named,
-        issues=rest.issues,
-        notes=(*rest.notes, *_notes(found)),
-        observable=rest.observable,
+        causes=(cause, *without_arm.causes),
+        unexplained=without_arm.unexplained,
+        next_run=without_arm.next_run,
+        named=without_arm.named,
+        issues=without_arm.issues,
+        notes=(*without_arm.notes, *_notes(arm)),
+        observable=without_arm.observable,
     )
 
 
-def _shrink(found: ArmGeometry, noise_mm: float) -> float:
+def _shrink(arm: ArmGeometry, noise_mm: float) -> float:
     """Return the share of the gap beyond noise that is gone at places left out."""
-    gap = found.before_mm**2 - noise_mm**2
-    gone = 1.0 - max(found.after_mm**2 - noise_mm**2, 0.0) / gap if gap > 0.0 else 1.0
+    gap = arm.before_mm**2 - noise_mm**2
+    gone = 1.0 - max(arm.after_mm**2 - noise_mm**2, 0.0) / gap if gap > 0.0 else 1.0
     return min(max(gone, 0.0), 1.0)
 
 
-def _notes(found: ArmGeometry) -> list[str]:
-    fit = found.fit
+def _notes(arm: ArmGeometry) -> list[str]:
+    fit = arm.fit
     notes = [
-        f"geometry: {len(fit.told)} small numbers of the arm, {found.before_mm:.3f} -> "
-        f"{found.after_mm:.3f} mm at places left out of the fit; `gcode2krl identify kinematics` has each "
+        f"geometry: {len(fit.told)} small numbers of the arm, {arm.before_mm:.3f} -> "
+        f"{arm.after_mm:.3f} mm at places left out of the fit; `gcode2krl identify kinematics` has each "
         "with its interval"
     ]
     if fit.is_outlier.any():
@@ -613,8 +613,10 @@ def next_run_of(
 ) -> NextRun | None:
     """Return the run that parts best what is left open; None where nothing is."""
     families = [
-        Family(each.link, each.at, each.on, each.form, each.probability, evidence)
-        for each, evidence in depends_on
+        Family(
+            dependence.link, dependence.at, dependence.on, dependence.form, dependence.probability, evidence
+        )
+        for dependence, evidence in depends_on
     ]
     choice = choose_next_run(context, judgements, families)
     return None if choice is None else told(choice)
@@ -688,19 +690,11 @@ def shown(apart: Apart, value: float, is_open: bool = False) -> str:
 
     ``is_open``: the runs do not say which way it goes.
     """
-    after = _after(apart.time_s)
-    if abs(value) < _LIMITS.seen_sigma * apart.noise / _values_at_a_point() ** 0.5:
+    at_s, values_at_a_point = apart.time_s, REFERENCE_DWELL_S / THRESHOLDS.choose.trial_step_s
+    after = f"{at_s:.0f} s" if at_s < _LIMITS.minutes_from_s else f"{at_s / S_PER_MIN:.0f} min"
+    if abs(value) < _LIMITS.seen_sigma * apart.noise / values_at_a_point**0.5:
         return f"nothing above the noise after {after}"
     place = _SIGNALS.get(apart.signal, apart.signal)
     since = " since the start" if apart.is_change else ""
     size = f"up to {value:.2g} {apart.unit} either way" if is_open else f"{value:+.2g} {apart.unit}"
     return f"{size} in {apart.component} {place} after {after}{since}"
-
-
-def _values_at_a_point() -> float:
-    """Return how many independent values a reference point gives."""
-    return REFERENCE_DWELL_S / THRESHOLDS.choose.trial_step_s
-
-
-def _after(time_s: float) -> str:
-    return f"{time_s:.0f} s" if time_s < _LIMITS.minutes_from_s else f"{time_s / S_PER_MIN:.0f} min"

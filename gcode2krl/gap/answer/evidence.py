@@ -49,9 +49,9 @@ def against(trace: Trace, samples: Ints, at: str | None, on: Set[Dependence]) ->
     """
     for dependence, shown in _SHOWN.items():
         if dependence in on:
-            found = shown(trace, samples, at)
-            if found is not None:
-                return found
+            values = shown(trace, samples, at)
+            if values is not None:
+                return values
     return None
 
 
@@ -187,19 +187,21 @@ def residuals_of(judgement: Judgement) -> list[Residual]:
     The named causes have the numbers that were fitted to the runs that explain.
     """
     traces = judgement.every or judgement.traces
-    found = judgement.examination
+    examination = judgement.examination
     with_named = [*judgement.usual, *judgement.applied]
-    likelihood = Likelihood(traces, nuisance_for(traces, found.question, found.data.known), found.noise)
-    left = [trace.measured - trace.sample(with_named) for trace in traces]
-    own, shared = fitted_mismatch(likelihood, left)
-    noise = np.array([each.sigma for each in found.noise])
+    likelihood = Likelihood(
+        traces, nuisance_for(traces, examination.question, examination.data.known), examination.noise
+    )
+    residual = [trace.measured - trace.sample(with_named) for trace in traces]
+    by_run, shared = fitted_mismatch(likelihood, residual)
+    noise = np.array([each.sigma for each in examination.noise])
     has_rest = not judgement.applied or judgement.told.significant
     residuals = []
-    for trace, rest, of_run, of_machine in zip(traces, left, own, shared, strict=True):
+    for trace, off, of_run, of_machine in zip(traces, residual, by_run, shared, strict=True):
         doing = trace.sample(with_named) - trace.sample(judgement.usual)
-        structured = smoothed(trace.time_s, rest - of_run - of_machine, THRESHOLDS.tell.rest_smooth_s)
+        structured = smoothed(trace.time_s, off - of_run - of_machine, THRESHOLDS.tell.rest_smooth_s)
         shape = doing + structured if has_rest else doing
-        after = rest - of_run
+        after = off - of_run
         residuals.append(Residual(trace=trace, before=after + doing, after=after, shape=shape, noise=noise))
     return residuals
 

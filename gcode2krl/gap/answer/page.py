@@ -329,13 +329,14 @@ def strip(evidence: Evidence, run: RunEvidence, intervals: Sequence[IntervalResu
     def level(value: Any) -> Any:
         return height * (top - value) / max(top - bottom, 1e-300)
 
-    own = [each for each in intervals if each.run == run.run and each.signal == evidence.signal]
+    of_run = [each for each in intervals if each.run == run.run and each.signal == evidence.signal]
     return Strip(
         before=_polyline(at(run.time_s[rows]), level(before)),
         after=_polyline(at(run.time_s[rows]), level(after)) if has_causes(run) else None,
         noise=(round(level(evidence.noise), 1), round(level(-evidence.noise) - level(evidence.noise), 1)),
         stretches=tuple(
-            (round(at(each.t_start_s), 1), round(at(each.t_end_s) - at(each.t_start_s), 1)) for each in own
+            (round(at(interval.t_start_s), 1), round(at(interval.t_end_s) - at(interval.t_start_s), 1))
+            for interval in of_run
         ),
         top=top,
         bottom=bottom,
@@ -347,7 +348,7 @@ def strip(evidence: Evidence, run: RunEvidence, intervals: Sequence[IntervalResu
 def points(run: RunEvidence) -> dict[str, list[Any]]:
     """Return what the slider shows at each of its places: time, line, sizes, and where each view has it."""
     rows = rows_of(run)
-    found: dict[str, list[Any]] = {
+    columns: dict[str, list[Any]] = {
         "t": [round(float(value), 3) for value in run.time_s[rows]],
         "line": [int(value) for value in run.line[rows]],
         "before": [float(f"{value:.3g}") for value in run.size_before[rows]],
@@ -358,10 +359,10 @@ def points(run: RunEvidence) -> dict[str, list[Any]]:
         for first, second in views_of(run):
             place = run.position_mm[rows]
             scale = _stretch(place, (first, second))
-            found["at"].append(
+            columns["at"].append(
                 [[round(float(x), 2), round(float(-scale * y), 2)] for x, y in place[:, [first, second]]]
             )
-    return found
+    return columns
 
 
 def scale_colours() -> list[str]:

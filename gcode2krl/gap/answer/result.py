@@ -50,10 +50,10 @@ def gap_object(gap: Any) -> dict[str, Any]:
 
 def _unexplained(unexplained: Any) -> dict[str, Any]:
     """Return what is left; a moment is ``t_s`` as in events, and ``at_time_s`` as it was first called."""
-    told: dict[str, Any] = plain(unexplained)
-    for each in told["depends_on"]:
-        each["t_s"] = each["at_time_s"]
-    return told
+    entry: dict[str, Any] = plain(unexplained)
+    for dependence in entry["depends_on"]:
+        dependence["t_s"] = dependence["at_time_s"]
+    return entry
 
 
 def _next_run(run: Any) -> dict[str, Any] | None:
@@ -73,7 +73,12 @@ def plain(value: Any) -> Any:
     if isinstance(value, Interval):
         value = value._asdict()
     if is_dataclass(value):
-        value = {_NAMES.get(name, name): each for name, each in _items(value) if not _is_left_out(name, each)}
+        items = ((entry.name, getattr(value, entry.name)) for entry in fields(value))
+        value = {
+            _NAMES.get(name, name): item
+            for name, item in items
+            if item is not None or name not in _LEFT_OUT_WHERE_NONE
+        }
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -85,14 +90,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value
-
-
-def _items(result: Any) -> list[tuple[str, Any]]:
-    return [(entry.name, getattr(result, entry.name)) for entry in fields(result)]
-
-
-def _is_left_out(name: str, value: Any) -> bool:
-    return value is None and name in _LEFT_OUT_WHERE_NONE
 
 
 def _issue(issue: Issue) -> dict[str, Any]:

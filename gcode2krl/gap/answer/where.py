@@ -267,8 +267,13 @@ def run_sizes(judged: Judgement, residuals: Sequence[Residual]) -> tuple[RunSize
     """Return the size of the gap of every run of a link, in the report's unit."""
     factor = judged.factor
     return tuple(
-        _run_size(judged, each.trace, factor * rms_length([each.before]), factor * rms_length([each.after]))
-        for each in residuals
+        _run_size(
+            judged,
+            residual.trace,
+            factor * rms_length([residual.before]),
+            factor * rms_length([residual.after]),
+        )
+        for residual in residuals
     )
 
 
@@ -366,7 +371,7 @@ def _converted(judged: Judgement, residuals: Sequence[Residual]) -> AtPart:
         noise=None,
         link=judged.link.name,
         per_run=tuple(
-            _run_size(judged, each.trace, rms_length([moved]), None)
-            for each, moved in zip(residuals, at_tip, strict=True)
+            _run_size(judged, residual.trace, rms_length([moved]), None)
+            for residual, moved in zip(residuals, at_tip, strict=True)
         ),
     )

@@ -180,21 +180,21 @@ def happened(event: EventResult) -> str:
     return f"{event.t_s:.2f} s of {event.run}{line}: {what}, for {rounded(1000.0 * event.lasts_s)} ms"
 
 
-def depends(found: DependsOnResult) -> str:
+def depends(dependence: DependsOnResult) -> str:
     """Return where a gap is and on what it depends: ``tip, a step from 11.2 s of run-1 on``."""
-    return ", ".join([_place(found), _form(found), *_size(found), *_course(found)])
+    return ", ".join([_place(dependence), _form(dependence), *_size(dependence), *_course(dependence)])
 
 
-def what_there_is(found: DependsOnResult) -> str:
+def what_there_is(dependence: DependsOnResult) -> str:
     """Return the same within a sentence: ``a step from 11.2 s of run-1 on at the tip``."""
-    place = _place(found)
+    place = _place(dependence)
     where = {"tip": "at the tip", "force": "in the force", "timing": "in time"}.get(place, f"in {place}")
-    return ", ".join([f"{_form(found)} {where}", *_size(found)])
+    return ", ".join([f"{_form(dependence)} {where}", *_size(dependence)])
 
 
-def _course(found: DependsOnResult) -> list[str]:
+def _course(dependence: DependsOnResult) -> list[str]:
     """Return a course by its ends and, where it lies between them, its farthest point from their line."""
-    course = found.course
+    course = dependence.course
     if course is None:
         return []
     (x0, y0), *_, (x1, y1) = course.points
@@ -203,37 +203,37 @@ def _course(found: DependsOnResult) -> list[str]:
         return abs(point[1] - y0 - (y1 - y0) * (point[0] - x0) / (x1 - x0))
 
     far = max(course.points, key=bend)
-    told = [(x0, y0), (x1, y1)]
+    ends = [(x0, y0), (x1, y1)]
     if bend(far) > max(abs(y1 - y0), max(abs(y) for _, y in course.points)) / 2.0:
-        told.insert(1, far)
-    words = [f"{rounded(y)} {course.unit} at {rounded(x)} {course.over_unit}" for x, y in told]
+        ends.insert(1, far)
+    words = [f"{rounded(y)} {course.unit} at {rounded(x)} {course.over_unit}" for x, y in ends]
     run = f" of {course.run}" if course.run else ""
     return [f"over {course.over}{run}: {' to '.join(words)}"]
 
 
-def _place(found: DependsOnResult) -> str:
+def _place(dependence: DependsOnResult) -> str:
     """Return the place; the direction says more than the axis of a force."""
-    return "force" if found.at in _FORCE_AXES else found.at
+    return "force" if dependence.at in _FORCE_AXES else dependence.at
 
 
-def _form(found: DependsOnResult) -> str:
-    if found.form in ("step", "impulse") and found.at_time_s is not None:
-        line = f", line {found.line}" if found.line else ""
-        at = f"{found.at_time_s:.1f} s" + (f" of {found.run}{line}" if found.run else "")
-        gone = ", gone in the next run" if found.in_later_runs is False else ""
-        return f"a step from {at} on{gone}" if found.form == "step" else f"an impulse at {at}"
-    if found.frequency_hz is not None:
-        return f"a tone of {number(found.frequency_hz)} Hz"
-    return _FORMS.get(found.form, "a function of {on}").format(on=found.on)
+def _form(dependence: DependsOnResult) -> str:
+    if dependence.form in ("step", "impulse") and dependence.at_time_s is not None:
+        line = f", line {dependence.line}" if dependence.line else ""
+        at = f"{dependence.at_time_s:.1f} s" + (f" of {dependence.run}{line}" if dependence.run else "")
+        gone = ", gone in the next run" if dependence.in_later_runs is False else ""
+        return f"a step from {at} on{gone}" if dependence.form == "step" else f"an impulse at {at}"
+    if dependence.frequency_hz is not None:
+        return f"a tone of {number(dependence.frequency_hz)} Hz"
+    return _FORMS.get(dependence.form, "a function of {on}").format(on=dependence.on)
 
 
-def _size(found: DependsOnResult) -> list[str]:
-    if found.size is None:
+def _size(dependence: DependsOnResult) -> list[str]:
+    if dependence.size is None:
         return []
-    size = f"{rounded(found.size)} {found.unit or ''}".rstrip()
-    if found.direction is None:
+    size = f"{rounded(dependence.size)} {dependence.unit or ''}".rstrip()
+    if dependence.direction is None:
         return [size]
-    return [f"{size} along ({', '.join(f'{round(value, 1) + 0.0:.1f}' for value in found.direction)})"]
+    return [f"{size} along ({', '.join(f'{round(value, 1) + 0.0:.1f}' for value in dependence.direction)})"]
 
 
 def kind(cause: CauseResult) -> str | None:
@@ -255,13 +255,10 @@ def next_run(run: NextRun) -> list[str]:
     lines = [f"gcode2krl make-test {run.program}, {minutes}"]
     for pair in run.separates:
         first, second = pair.first.replace("_", " "), pair.second.replace("_", " ")
-        lines.append(f'tells "{first}" from "{second}", odds {_odds(pair.odds)}')
+        odds = "over 1000" if pair.odds > 1000.0 else rounded(pair.odds)
+        lines.append(f'tells "{first}" from "{second}", odds {odds} to 1')
     lines += [f"if {each.answer.replace('_', ' ')}: {each.shows}" for each in run.expect]
     return lines
-
-
-def _odds(odds: float) -> str:
-    return "over 1000 to 1" if odds > 1000.0 else f"{rounded(odds)} to 1"
 
 
 IMPULSE = "impulse"
@@ -287,8 +284,8 @@ def events_of(judgement: Judgement) -> Iterator[EventResult]:
 
 def impulses_of(judgement: Judgement) -> Iterator[DependsOnResult]:
     """Yield the impulses of a link, or the slips that are its gap, the largest first."""
-    found = judgement.impulses or (() if judgement.told.significant else judgement.slips)
-    impulses = sorted(found, key=lambda event: -event.power)
+    events = judgement.impulses or (() if judgement.told.significant else judgement.slips)
+    impulses = sorted(events, key=lambda event: -event.power)
     power = sum(event.power for event in impulses)
     power += max(judgement.size.excess_before, 0.0) * judgement.size.rows
     for event in impulses[: THRESHOLDS.tell.most_alike]:
@@ -474,12 +471,9 @@ def _why(gap: Gap) -> str:
         words += f"; it is {what_there_is(gap.unexplained.depends_on[0])}"
     unsure = [cause for cause in gap.causes if cause.probability >= _LIMITS.worth_a_word]
     if unsure:
-        words += f"; perhaps {listed([_perhaps(cause) for cause in unsure], 'or')}"
+        perhaps = [f"{named(cause.effect, cause.target)} ({cause.probability:.2f})" for cause in unsure]
+        words += f"; perhaps {listed(perhaps, 'or')}"
     return words
-
-
-def _perhaps(cause: CauseResult) -> str:
-    return f"{named(cause.effect, cause.target)} ({cause.probability:.2f})"
 
 
 def _left(gap: Gap) -> str:
@@ -494,11 +488,11 @@ def _left(gap: Gap) -> str:
         if gap.gap.shrink is None:
             return ""
         return f"{model} {gap.gap.shrink:.0%} of the gap is gone{held}{_rest(gap)}."
-    left = amount(at.rms_after, at.unit)
+    words = amount(at.rms_after, at.unit)
     before = at.held_out_before
     if held and before is not None and not _is_about(before, at.rms_before):
-        left += f" of {amount(before, at.unit)}"
-    return f"{model} {left} are left{held}{_beside(at)}{_rest(gap)}."
+        words += f" of {amount(before, at.unit)}"
+    return f"{model} {words} are left{held}{_beside(at)}{_rest(gap)}."
 
 
 def _is_about(size: float, other: float) -> bool:
@@ -593,8 +587,8 @@ def where_lines(gap: Gap) -> Iterator[str]:
 
 def left_lines(gap: Gap) -> Iterator[str]:
     """Yield on what depends what no named cause explains, the most probable first."""
-    for found in gap.unexplained.depends_on[: _LIMITS.report_lines]:
-        yield f"{found.probability:.2f} {depends(found)}; takes {found.share:.0%} of the gap"
+    for dependence in gap.unexplained.depends_on[: _LIMITS.report_lines]:
+        yield f"{dependence.probability:.2f} {depends(dependence)}; takes {dependence.share:.0%} of the gap"
 
 
 def _link(link: LinkResult) -> str:
@@ -606,11 +600,11 @@ def _link(link: LinkResult) -> str:
 
 def _run_lines(size: GapSize) -> Iterator[str]:
     """Yield the gap of each run, where there are several."""
-    for each in size.per_run if len(size.per_run) > 1 else ():
-        before, after = number(each.rms_before), number(each.rms_after)
+    for run in size.per_run if len(size.per_run) > 1 else ():
+        before, after = number(run.rms_before), number(run.rms_after)
         with_causes = "" if before == after else f", {after} with the named causes"
-        held_out = ", held out" if each.held_out else ""
-        yield f"{each.run}: {before} {size.unit} RMS{with_causes}{held_out}"
+        held_out = ", held out" if run.held_out else ""
+        yield f"{run.run}: {before} {size.unit} RMS{with_causes}{held_out}"
 
 
 def _cause(cause: CauseResult) -> Iterator[str]:
@@ -642,14 +636,14 @@ def gap_html(gap: Gap) -> str:
         ("link", "before", "after", "noise", "unit", "verdict"),
         [
             (
-                each.link,
-                number(each.rms_before),
-                number(each.rms_after),
-                number(each.floor),
-                each.unit,
-                each.verdict,
+                link.link,
+                number(link.rms_before),
+                number(link.rms_after),
+                number(link.floor),
+                link.unit,
+                link.verdict,
             )
-            for each in gap.links
+            for link in gap.links
         ],
     )
     causes = text_table(

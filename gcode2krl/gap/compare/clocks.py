@@ -84,12 +84,12 @@ def residual_by_place(trace: Trace, applied: Sequence[Applied]) -> Floats:
     moves = (power > _LIMITS.timing_slow**2 * float(np.mean(power))) & (along < measured_way[-1])
     if not moves.any() or float(np.abs(late[moves]).max()) < _LIMITS.retime_far_s:
         return plain
-    beside = cubic(at_s, trace.time_s, trace.measured) - model
-    if np.sum(beside[moves] ** 2) > _LIMITS.same_path_share**2 * np.sum(plain[moves] ** 2):
+    off = cubic(at_s, trace.time_s, trace.measured) - model
+    if np.sum(off[moves] ** 2) > _LIMITS.same_path_share**2 * np.sum(plain[moves] ** 2):
         return plain
     # over rests, and where the rows end before the path does, it is as late as before
     late = np.interp(trace.time_s, trace.time_s[moves], late[moves])
-    first_order: Floats = np.where(moves[:, None], beside, 0.0) - rate * late[:, None]
+    first_order: Floats = np.where(moves[:, None], off, 0.0) - rate * late[:, None]
     return first_order
 
 
@@ -172,8 +172,8 @@ def with_controller_clocks(context: Context, path: "Link") -> Context:
             for pair, offset_s in zip(context.pairs, offsets, strict=True)
         ]
 
-    left = [trace.residual for trace in path.traces(later(0.0))]
-    if not left or rms(np.concatenate(left)) >= path.model_rms:
+    residuals = [trace.residual for trace in path.traces(later(0.0))]
+    if not residuals or rms(np.concatenate(residuals)) >= path.model_rms:
         return context
     return replace(context.with_pairs(later(kept_s)), clocks_set=True)
 

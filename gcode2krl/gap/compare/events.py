@@ -86,11 +86,11 @@ def _local(rough: Floats, usual: float, window: int) -> Floats:
 
 def _fourth_differences(values: Floats, segments: Ints) -> Floats:
     """Return fourth differences (n,) around each row; not a number at two rows at each end of a segment."""
-    found = np.full(len(values), np.nan)
+    differences = np.full(len(values), np.nan)
     for first, last in segments:
         if last - first >= len(_WEIGHTS):
-            found[first + 2 : last - 2] = np.convolve(values[first:last], _WEIGHTS, mode="valid")
-    return found
+            differences[first + 2 : last - 2] = np.convolve(values[first:last], _WEIGHTS, mode="valid")
+    return differences
 
 
 def _outliers(values: Floats, segments: Ints, usual: float) -> Bools:
@@ -100,8 +100,8 @@ def _outliers(values: Floats, segments: Ints, usual: float) -> Bools:
         x = values[first:last]
         if len(x) < 3:
             continue
-        beside = 0.5 * (x[:-2] + x[2:])
-        off = np.abs(x[1:-1] - beside)
+        middle = 0.5 * (x[:-2] + x[2:])
+        off = np.abs(x[1:-1] - middle)
         # of normal values the median fourth difference is 5.6 deviations
         least = _LIMITS.outlier_deviations * usual / 5.6
         far[first + 1 : last - 1] = (off > least) & (np.abs(x[2:] - x[:-2]) < 0.5 * off)
@@ -129,29 +129,29 @@ def pulse_rows(time_s: Floats, values: Floats, segments: Ints, least: Floats) ->
     step_s = usual_step_s(time_s) if len(time_s) > 1 else 1.0
     around = max(_rows(_LIMITS.pulse_around_s, step_s), 4 * _LEAST_PULSE_ROWS + 1)
     for column, smallest in zip(values.T, least.tolist(), strict=True):
-        own = np.zeros(len(values), dtype=np.bool_)
+        is_pulse = np.zeros(len(values), dtype=np.bool_)
         for first, last in segments:
             if last - first > around:
-                own[first:last] = _of_column(column[first:last], step_s, around, smallest)
-        if np.mean(own) <= _LIMITS.bursts_most:
-            pulsed |= own
+                is_pulse[first:last] = _of_column(column[first:last], step_s, around, smallest)
+        if np.mean(is_pulse) <= _LIMITS.bursts_most:
+            pulsed |= is_pulse
     return pulsed
 
 
 def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bools:
     from scipy.ndimage import maximum_filter1d, median_filter
 
-    left: Floats = values - median_filter(values, size=around, mode="nearest")
+    high: Floats = values - median_filter(values, size=around, mode="nearest")
     pulsed = np.zeros(len(values), dtype=np.bool_)
     for width_s in _LIMITS.pulse_widths_s:
         width = max(_rows(width_s, step_s), _LEAST_PULSE_ROWS)
-        middle = median_filter(left, size=width, mode="nearest")
+        middle = median_filter(high, size=width, mode="nearest")
         usual = max(usual_deviation(middle), least)
         if usual > 0.0:
-            rough = _roughness(left, 2 * width + 1)
+            rough = _roughness(high, 2 * width + 1)
             far = np.abs(middle) > _LIMITS.pulse_deviations * usual * rough
             height = maximum_filter1d(np.where(far, np.abs(middle), 0.0), width)
-            pulsed |= (height > 0.0) & (np.abs(left) > _OF_HEIGHT * height)
+            pulsed |= (height > 0.0) & (np.abs(high) > _OF_HEIGHT * height)
     return pulsed
 
 
@@ -195,11 +195,11 @@ def _without(trace: Trace) -> Trace:
     step_s = usual_step_s(trace.time_s)
     measured, spectrum = trace.measured.copy(), _Spectrum.of(trace.time_s - trace.time_s[0])
     # what is folded to a drift is none to be told
-    told = (hz for hz in _mains_hz(trace) if 4.0 * _LIMITS.hum_around_hz < _folded(hz, step_s))
-    found = [hz for hz in told if spectrum.take_off(measured, trace.nominal, hz)]
-    if not found:
+    mains_hz = (hz for hz in _mains_hz(trace) if 4.0 * _LIMITS.hum_around_hz < _folded(hz, step_s))
+    taken_hz = [hz for hz in mains_hz if spectrum.take_off(measured, trace.nominal, hz)]
+    if not taken_hz:
         return trace
-    hum = f"hum of the mains at {', '.join(f'{hz:g}' for hz in found)} Hz"
+    hum = f"hum of the mains at {', '.join(f'{hz:g}' for hz in taken_hz)} Hz"
     return replace(trace, measured=measured, left_out=(*trace.left_out, hum))
 
 
@@ -293,13 +293,17 @@ def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]])
     repeated = [_repeated(traces, rests, stretches, number) for number in range(len(traces))]
     shared = [_at(trace, elsewhere.get(trace.run, ())) for trace in traces]
     coincident = _in_step(traces, stretches, shared, least=1)
-    found = [
-        _sorted(_Levels(trace, rest), own, [a or b for a, b in zip(command, again, strict=True)], both)
-        for trace, rest, own, command, again, both in zip(
+    sorted_traces = [
+        _sorted(_Levels(trace, calm), spans, [a or b for a, b in zip(command, again, strict=True)], both)
+        for trace, calm, spans, command, again, both in zip(
             traces, rests, stretches, commanded, repeated, coincident, strict=True
         )
     ]
-    return [_of_a_bursty_instrument(trace) for trace in found] if _is_bursty(found) else found
+    return (
+        [_of_a_bursty_instrument(trace) for trace in sorted_traces]
+        if _is_bursty(sorted_traces)
+        else sorted_traces
+    )
 
 
 def line_at(inputs: Inputs, at_s: float) -> int:
@@ -332,7 +336,7 @@ def _rest(trace: Trace) -> Floats:
     """
     if not _is_asked(trace):
         return trace.residual
-    inputs, rest = Admissible(trace), trace.residual.copy()
+    inputs, calm = Admissible(trace), trace.residual.copy()
     shared = np.column_stack(
         [
             *(inputs.position_mm, inputs.q_rad, inputs.rate_rad_s, inputs.acceleration_rad_s2),
@@ -340,19 +344,19 @@ def _rest(trace: Trace) -> Floats:
         ]
     )
     # by what changes within moments: a step of the rest is then a few rows that are far off
-    now = np.arange(0, len(rest), max(1, len(rest) // _MOST_FITTED))
-    later = np.minimum(np.searchsorted(trace.time_s, trace.time_s[now] + _MOMENT_S), len(rest) - 1)
+    now = np.arange(0, len(calm), max(1, len(calm) // _MOST_FITTED))
+    later = np.minimum(np.searchsorted(trace.time_s, trace.time_s[now] + _MOMENT_S), len(calm) - 1)
     for j, column in enumerate(trace.columns):
-        own = inputs.tool_axes[:, column % 3]
+        along = inputs.tool_axes[:, column % 3]
         if trace.link.of_tip:
-            own = inputs.jacobian[:, column] * inputs.directions
-        columns = np.column_stack([shared, own])
+            along = inputs.jacobian[:, column] * inputs.directions
+        columns = np.column_stack([shared, along])
         changes = columns[later] - columns[now]
         scale = np.sqrt(np.mean(changes**2, axis=0))
         used = scale > 1e-9 * np.maximum(np.abs(columns).max(axis=0), 1e-12)
-        weights = _fitted(changes[:, used] / scale[used], rest[later, j] - rest[now, j])
-        rest[:, j] -= columns[:, used] @ (weights / scale[used])
-    return rest
+        weights = _fitted(changes[:, used] / scale[used], calm[later, j] - calm[now, j])
+        calm[:, j] -= columns[:, used] @ (weights / scale[used])
+    return calm
 
 
 def _fitted(columns: Floats, values: Floats) -> Floats:
@@ -367,12 +371,12 @@ def _fitted(columns: Floats, values: Floats) -> Floats:
     return weights
 
 
-def _stretches(trace: Trace, rest: Floats) -> Iterator[_Stretch]:
+def _stretches(trace: Trace, calm: Floats) -> Iterator[_Stretch]:
     """Yield the rough stretches of a trace whose rest (n, k) is this."""
     if not _is_asked(trace):
         return
     least = np.array([resolution(column) for column in trace.measured.T])
-    pulsed = pulse_rows(trace.time_s, rest, trace.segments, least) & ~_is_edge(trace, rest)
+    pulsed = pulse_rows(trace.time_s, calm, trace.segments, least) & ~_is_edge(trace, calm)
     rough = pulsed | loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
     rows = np.flatnonzero(rough)
     if not len(rows):
@@ -383,15 +387,15 @@ def _stretches(trace: Trace, rest: Floats) -> Iterator[_Stretch]:
         yield _Stretch(first, last, bool(pulsed[first:last].any()))
 
 
-def _is_edge(trace: Trace, rest: Floats) -> Bools:
+def _is_edge(trace: Trace, calm: Floats) -> Bools:
     """Return the rows (n,) of a force that is off by less than its model changes there: an edge."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     if trace.link.of_joints or trace.link.of_tip:
-        return np.zeros(len(rest), dtype=np.bool_)
+        return np.zeros(len(calm), dtype=np.bool_)
     around = 2 * int(_MOMENT_S / usual_step_s(trace.time_s)) + 1
     reach = maximum_filter1d(trace.nominal, around, axis=0) - minimum_filter1d(trace.nominal, around, axis=0)
-    edge: Bools = np.linalg.norm(rest, axis=1) < np.linalg.norm(reach, axis=1)
+    edge: Bools = np.linalg.norm(calm, axis=1) < np.linalg.norm(reach, axis=1)
     return edge
 
 
@@ -416,8 +420,8 @@ def _in_step(
     from scipy.special import bdtrc
 
     inside = [
-        [bool(rows[each.first : each.last].any()) for each in own]
-        for own, rows in zip(stretches, chosen, strict=True)
+        [bool(rows[each.first : each.last].any()) for each in spans]
+        for spans, rows in zip(stretches, chosen, strict=True)
     ]
     events = [not _is_outlier(each) for own in stretches for each in own]
     counted = sum(a and b for a, b in zip(events, [each for own in inside for each in own], strict=True))
@@ -486,28 +490,28 @@ def _repeated(
         everywhere[:] = False
     again = [linear(trace.time_s, traces[i].time_s, rests[i]) for i in repeats]
     return [
-        not _is_outlier(each)
-        and (bool(everywhere[each.first : each.last].any()) or _is_in_all(each, rests[number], again))
-        for each in stretches[number]
+        not _is_outlier(span)
+        and (bool(everywhere[span.first : span.last].any()) or _is_in_all(span, rests[number], again))
+        for span in stretches[number]
     ]
 
 
-def _is_in_all(stretch: _Stretch, rest: Floats, again: Sequence[Floats]) -> bool:
+def _is_in_all(stretch: _Stretch, calm: Floats, again: Sequence[Floats]) -> bool:
     """Tell whether a pulse of a rest (n, k) is in all other ones (n, k) by half of its height at least."""
     if not stretch.is_pulse:
         return False
     # between the rows before and behind it, so that a level of each run's own says nothing
-    rows = np.arange(max(stretch.first - 1, 0), min(stretch.last + 1, len(rest)))
+    rows = np.arange(max(stretch.first - 1, 0), min(stretch.last + 1, len(calm)))
     share = np.linspace(0.0, 1.0, len(rows))[:, None]
-    own, *others = (
-        values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (rest, *again)
+    here, *others = (
+        values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (calm, *again)
     )
-    return all(float(np.sum(own * each)) > 0.5 * float(np.sum(own**2)) for each in others)
+    return all(float(np.sum(here * each)) > 0.5 * float(np.sum(here**2)) for each in others)
 
 
-def _is_repeat(one: Trace, other: Trace) -> bool:
-    a, b = one.inputs, other.inputs
-    same = len(a) == len(b) and one.run != other.run
+def _is_repeat(first: Trace, other: Trace) -> bool:
+    a, b = first.inputs, other.inputs
+    same = len(a) == len(b) and first.run != other.run
     return same and bool(np.allclose(a.position_mm, b.position_mm, atol=_SAME_MM))
 
 
@@ -546,11 +550,11 @@ def _sorted(
         events.append(event)
     if not events and not out.any():
         return trace
-    told = [f"{outliers} of {len(out)} rows: outliers of the instrument"] if outliers else []
+    words = [f"{outliers} of {len(out)} rows: outliers of the instrument"] if outliers else []
     return replace(
         with_rows(trace, ~out),
         events=(*trace.events, *events),
-        left_out=(*trace.left_out, *told),
+        left_out=(*trace.left_out, *words),
     )
 
 
@@ -571,8 +575,8 @@ def _of_a_bursty_instrument(trace: Trace) -> Trace:
 class _Levels:
     """The level of a trace's rest before and after its stretches."""
 
-    def __init__(self, trace: Trace, rest: Floats) -> None:
-        self.trace, self._rest = trace, rest
+    def __init__(self, trace: Trace, calm: Floats) -> None:
+        self.trace, self._rest = trace, calm
 
     def event(self, stretch: _Stretch, whose: Whose, change: Floats) -> Event:
         """Return the event of a stretch."""

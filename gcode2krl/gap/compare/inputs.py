@@ -143,8 +143,8 @@ class Admissible:
     def _at(self, values: Floats) -> Floats:
         """Return values (m,) or (m, c) of the model's samples at the rows."""
         wide = values[:, None] if values.ndim == 1 else values
-        found = linear(self.trace.time_s, self.trace.inputs.time_s, wide)
-        return found[:, 0] if values.ndim == 1 else found
+        at_rows = linear(self.trace.time_s, self.trace.inputs.time_s, wide)
+        return at_rows[:, 0] if values.ndim == 1 else at_rows
 
     @cached_property
     def _nearest(self) -> Ints:
@@ -337,8 +337,8 @@ class Admissible:
     def directions(self) -> Floats:
         """(n, 6) of the joints' motion, ±1 with memory."""
         inputs = self.trace.inputs
-        found = [since_reversal(np.ascontiguousarray(q), inputs.time_s)[0] for q in inputs.q_cmd_rad.T]
-        return np.stack(found, axis=1)[self._nearest]
+        directions = [since_reversal(np.ascontiguousarray(q), inputs.time_s)[0] for q in inputs.q_cmd_rad.T]
+        return np.stack(directions, axis=1)[self._nearest]
 
     def reversals(self, joint: int) -> Floats:
         """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.

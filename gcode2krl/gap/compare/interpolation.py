@@ -75,9 +75,9 @@ def interpolate(signals: Signals, name: str, times_s: Floats, last: LastPath | N
 def linear(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
     """Return the columns (m, c) at other times, linearly; the ends are held."""
     row, share = _place(times_s, own_s)
-    found = np.empty((len(row), values.shape[1]))
-    _fill_lines(row, share, np.ascontiguousarray(values, dtype=np.float64), found)
-    return found
+    at_times = np.empty((len(row), values.shape[1]))
+    _fill_lines(row, share, np.ascontiguousarray(values, dtype=np.float64), at_times)
+    return at_times
 
 
 def cubic(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
@@ -86,9 +86,9 @@ def cubic(times_s: Floats, own_s: Floats, values: Floats) -> Floats:
         raise ValueError("a cubic needs two samples at least")
     row, share = _place(times_s, own_s)
     own_s, values = (np.ascontiguousarray(each, dtype=np.float64) for each in (own_s, values))
-    found = np.empty((len(row), values.shape[1]))
-    _fill_cubics(row, share, own_s, values, found)
-    return found
+    at_times = np.empty((len(row), values.shape[1]))
+    _fill_cubics(row, share, own_s, values, at_times)
+    return at_times
 
 
 def nearest_rows(own_s: Floats, times_s: Floats) -> Ints:

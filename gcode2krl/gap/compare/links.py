@@ -643,10 +643,10 @@ def _foot(point: Floats, path: Floats, radius: Floats, corner: Floats) -> _Foot 
         row = int(over[np.argmin(path[over, 2])])
         low = float(path[row, 2] - point[2])
         return _Foot(low, False, np.array([0.0, 0.0, 1.0]), row) if abs(low) < _LIMITS.scan_reach_mm else None
-    beside = np.flatnonzero(path[:, 2] + corner < point[2] - _LIMITS.scan_above_mm)
-    if not len(beside):
+    below = np.flatnonzero(path[:, 2] + corner < point[2] - _LIMITS.scan_above_mm)
+    if not len(below):
         return None
-    row = int(beside[np.argmin(away[beside] - radius[beside])])
+    row = int(below[np.argmin(away[below] - radius[below])])
     far = float(away[row] - radius[row])
     if abs(far) > _LIMITS.scan_reach_mm:
         return None

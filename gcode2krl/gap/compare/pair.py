@@ -123,7 +123,7 @@ class Simulator:
     def commanded(self, inputs: Inputs, applied: Sequence[Applied]) -> Signals:
         """Return the signals of the commanded path with effects at work, clocks included."""
         effects = tuple(
-            (each.effect.name, each.target, each.planned, *each.values.items()) for each in applied
+            (effect.effect.name, effect.target, effect.planned, *effect.values.items()) for effect in applied
         )
         if inputs not in self._digests:
             self._digests[inputs] = _digest(inputs)
@@ -397,8 +397,8 @@ def pairs_of(prediction: Prediction, runs: Sequence[Run]) -> Iterator[Pair]:
             shared[key] = _shared(Prediction.load(folder) if named and folder else prediction)
         inputs, simulator = shared[key]
         temperature_C = temperature_at(run.controller, inputs.time_s)
-        own = replace(inputs, hours=hours_since(first, run), temperature_C=temperature_C)
-        yield Pair(run=run, number=number, inputs=own, simulator=simulator)
+        of_run = replace(inputs, hours=hours_since(first, run), temperature_C=temperature_C)
+        yield Pair(run=run, number=number, inputs=of_run, simulator=simulator)
 
 
 def _shared(prediction: Prediction) -> tuple[Inputs, Simulator]:

@@ -245,22 +245,22 @@ def best_of(traces: Sequence[Trace], candidates: Sequence[Applied]) -> tuple[App
     best, least = candidates[0], float("inf")
     for candidate in candidates:
         try:
-            left = rms_left(traces, candidate)
+            rms_mm = rms_left(traces, candidate)
         except Gcode2KrlError:
             continue
-        if left < least:
-            best, least = candidate, left
+        if rms_mm < least:
+            best, least = candidate, rms_mm
     return best, least
 
 
-def slip_if_explained(traces: Sequence[Trace], applied: Applied, left: float, words: str) -> list[Slip]:
-    """Return the slip where it takes nine tenths of the gap's power; ``left`` is the rms that it leaves."""
+def slip_if_explained(traces: Sequence[Trace], applied: Applied, after: float, words: str) -> list[Slip]:
+    """Return the slip where it takes nine tenths of the gap's power; ``after`` is the rms that it leaves."""
     before = rms_before(traces)
-    if left**2 > (1.0 - THRESHOLDS.slips.explained_share) * before**2:
+    if after**2 > (1.0 - THRESHOLDS.slips.explained_share) * before**2:
         return []
     trace = traces[0]
     factor = trace.factor
-    return [Slip(applied, trace.link, before * factor, left * factor, trace.unit, words)]
+    return [Slip(applied, trace.link, before * factor, after * factor, trace.unit, words)]
 
 
 def final_slip(effect: Effect, target: str | None, words: str, pairs: Sequence[Pair]) -> Slip:
@@ -374,16 +374,16 @@ _LIMITS = THRESHOLDS.slips
 
 def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
     """Return the pairs, those in air without forces; a warning for each that nobody stated."""
-    found, issues = [], []
+    pairs_in_air, issues = [], []
     simulators: dict[Simulator, Simulator] = {}
     for pair in pairs:
         stated = pair.run.head.in_air
         if stated is False or not pair.inputs.force_base_N.any():
-            found.append(pair)
+            pairs_in_air.append(pair)
             continue
         in_air = _in_air(pair, simulators.setdefault(pair.simulator, Simulator()))
         if stated or _is_nearer(pair, in_air):
-            found.append(in_air)
+            pairs_in_air.append(in_air)
             if not stated:
                 words = (
                     f"{pair.name}: the tip shows nothing of the predicted deflection: taken as a run in air"
@@ -391,8 +391,8 @@ def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
                 remedy = "in_air = true in run.toml; false where something was cut"
                 issues.append(Issue("warning", "run-in-air", 0, words, remedy))
         else:
-            found.append(pair)
-    return found, issues
+            pairs_in_air.append(pair)
+    return pairs_in_air, issues
 
 
 def _in_air(pair: Pair, simulator: Simulator) -> Pair:
@@ -437,12 +437,12 @@ class OverrideTest:
             return []
         percent = float(np.median(percents))
         tried = percent * np.array(_LIMITS.override_first_tries)
-        best, left = best_of(traces, [Applied(effect, None, {"percent": float(each)}) for each in tried])
+        best, after = best_of(traces, [Applied(effect, None, {"percent": float(each)}) for each in tried])
         for width in _LIMITS.override_widths:
             around = best.values["percent"] * (1.0 + width * np.array([-0.5, 0.0, 0.5, -1.0, 1.0]))
-            best, left = best_of(traces, [replace(best, values={"percent": float(each)}) for each in around])
+            best, after = best_of(traces, [replace(best, values={"percent": float(each)}) for each in around])
         words = f"the run was at {best.values['percent']:.1f} % override"
-        return slip_if_explained(traces, best, left, words)
+        return slip_if_explained(traces, best, after, words)
 
 
 def _percent(pair: Pair) -> float | None:
@@ -523,7 +523,7 @@ def _explaining_stops(pairs: Sequence[Pair], before: float) -> _Stops | None:
     The corner after a stop may look late too. With it left out as much of the gap must go as with it: how
     many stops there are and how long each holds then follow from the same data.
     """
-    found: list[_Stops] = []
+    kept: list[_Stops] = []
     delays = [_delays_at_stops(pair) for pair in pairs]
     sizes_s = sorted({0.0, *(late_s for by_row in delays for late_s in by_row.values())})
     for least_s in sizes_s[: _LIMITS.stop_dropped_delays]:
@@ -534,11 +534,11 @@ def _explaining_stops(pairs: Sequence[Pair], before: float) -> _Stops | None:
         if not any(len(of_run) for of_run in rows):
             break
         hold_s, stopped = _held(pairs, rows)
-        left = _rms(motion_traces([_on_time(pair) for pair in stopped]))
-        if left**2 < (1.0 - _LIMITS.stop_explained_share) * before**2:
-            found.append(_Stops(rows, hold_s, stopped, left))
-    least = min((each.rms_left for each in found), default=0.0)
-    return next((each for each in reversed(found) if each.rms_left <= _LIMITS.stop_as_good * least), None)
+        after = _rms(motion_traces([_on_time(pair) for pair in stopped]))
+        if after**2 < (1.0 - _LIMITS.stop_explained_share) * before**2:
+            kept.append(_Stops(rows, hold_s, stopped, after))
+    least = min((each.rms_left for each in kept), default=0.0)
+    return next((each for each in reversed(kept) if each.rms_left <= _LIMITS.stop_as_good * least), None)
 
 
 def _held(pairs: Sequence[Pair], stops: Sequence[Ints]) -> tuple[float, list[Pair]]:
@@ -585,16 +585,12 @@ def _lateness(pair: Pair, corners: Ints) -> Floats:
     rows = rows_of_passing(pair.inputs.position_mm, targets.position_mm[corners])
     edges = way[np.concatenate([[0], rows, [len(way) - 1]])]
     late = [0.0]
-    for at in (_leg(a, b) for a, b in pairwise(edges)):
+    for first, last in pairwise(edges):
+        at = first + (last - first) * np.linspace(0.35, 0.65, 7)  # the middle third of the leg
         behind = np.median(np.interp(at, run_way, run_s) - np.interp(at, way, time_s))
         # what the run did after the prediction's end was not looked at
         late.append(float(behind) if at[-1] < run_way[-1] else late[-1])
     return np.diff(late[1:])
-
-
-def _leg(start: float, end: float) -> Floats:
-    """Return places in the middle third of a leg."""
-    return start + (end - start) * np.linspace(0.35, 0.65, 7)
 
 
 def _stopped(pair: Pair, rows: Ints, hold_s: float) -> Pair:

@@ -65,7 +65,9 @@ def nuisance_of(
         *_of_instruments(trace, library, mismatch, upstream, clock),
     ]
     return [
-        each for each in every if np.any(each.columns) or (each.missed is not None and np.any(each.missed))
+        nuisance
+        for nuisance in every
+        if np.any(nuisance.columns) or (nuisance.missed is not None and np.any(nuisance.missed))
     ]
 
 
@@ -200,11 +202,11 @@ class NuisanceDesign:
         places: dict[tuple[str, int], list[int]] = {}
         for items, at in zip(self.nuisance, self.places, strict=True):
             first = 0
-            for each in items:
-                for number in range(_width(each)):
-                    if not each.shared:
-                        places.setdefault((each.name, number), []).append(int(at[first + number]))
-                first += _width(each)
+            for nuisance in items:
+                for number in range(_width(nuisance)):
+                    if not nuisance.shared:
+                        places.setdefault((nuisance.name, number), []).append(int(at[first + number]))
+                first += _width(nuisance)
         return tuple(np.array(own, dtype=np.int64) for own in places.values())
 
     @classmethod
@@ -217,10 +219,10 @@ class NuisanceDesign:
         for items in nuisance:
             common = sorted((each for each in items if each.shared), key=lambda each: firsts[each.name])
             ordered.append((*common, *(each for each in items if not each.shared)))
-            own = sum(_width(each) for each in items if not each.shared)
+            width = sum(_width(each) for each in items if not each.shared)
             at_shared = [np.arange(_width(each)) + firsts[each.name] for each in common]
-            places.append(np.concatenate([*at_shared, np.arange(at, at + own)]).astype(np.int64))
-            at += own
+            places.append(np.concatenate([*at_shared, np.arange(at, at + width)]).astype(np.int64))
+            at += width
         return cls(tuple(ordered), tuple(places), shared, at)
 
     def columns(self, number: int, trace: Trace) -> Floats:

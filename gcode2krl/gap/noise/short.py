@@ -172,11 +172,11 @@ class Noise:
     def autocovariance(self, count: int) -> Floats:
         """Return E[x[t]·x[t+k]] for k = 0 … count - 1, the short part scaled to its rms."""
         short = _short_autocovariance(self.a, count)
-        found: Floats = self.short_sigma**2 * short / short[0]
+        covariance: Floats = self.short_sigma**2 * short / short[0]
         lags = np.arange(count)
-        for each in self.slow:
-            found = found + each.sigma**2 * each.pole**lags
-        return found
+        for part in self.slow:
+            covariance = covariance + part.sigma**2 * part.pole**lags
+        return covariance
 
 
 def white(sigma: float) -> Noise:
@@ -215,8 +215,8 @@ def fit(
     x, y = products[1:, 1:], products[1:, 0]
     ridge = 1e-6 * float(np.trace(x)) + floor**2 * 0.1 + 1e-30
     a = _stable(np.asarray(np.linalg.solve(x + ridge * np.eye(order), y), dtype=np.float64))
-    left = float(products[0, 0] - 2.0 * a @ y + a @ x @ a)
-    scale = max(float(np.sqrt(max(left, 0.0))), _LIMITS.noise_least_scale * floor)
+    power_left = float(products[0, 0] - 2.0 * a @ y + a @ x @ a)
+    scale = max(float(np.sqrt(max(power_left, 0.0))), _LIMITS.noise_least_scale * floor)
     return Noise(a, scale, max(sigma, scale))
 
 
@@ -266,10 +266,10 @@ def _share_off(products: Floats, drawn: Floats) -> float:
     off = drawn.T @ drawn / max(len(drawn), 1)
     differences = np.eye(len(products))[:-1] - np.eye(len(products))[1:]
     for share in _SHARES:
-        left = products - share * off
+        cleaned = products - share * off
         # what the slow part hardly has is left whole: the differences of neighbours
         least = _LEAST_LEFT * np.trace(differences @ products @ differences.T) / (2.0 * len(differences))
-        if np.linalg.eigvalsh(left)[0] > 0.0 and left[0, 0] > least:
+        if np.linalg.eigvalsh(cleaned)[0] > 0.0 and cleaned[0, 0] > least:
             return share
     return 0.0
 
@@ -280,8 +280,8 @@ def drawn_noise(noise: Noise, count: int, generator: np.random.Generator) -> Flo
 
     white_ = noise.scale * generator.standard_normal(count + _SETTLED)
     drawn: Floats = lfilter([1.0], np.concatenate([[1.0], -noise.a]), white_)[_SETTLED:]
-    for each in noise.slow:
-        drawn = drawn + drawn_slow(each, count, generator)
+    for part in noise.slow:
+        drawn = drawn + drawn_slow(part, count, generator)
     return drawn
 
 
@@ -335,10 +335,10 @@ def _short_autocovariance(a: Floats, count: int) -> Floats:
     pulse = np.zeros(2 * _SETTLED)
     pulse[0] = 1.0
     h = lfilter([1.0], np.concatenate([[1.0], -a]), pulse)
-    found = np.zeros(count)
+    covariance = np.zeros(count)
     for k in range(min(count, _SETTLED)):
-        found[k] = h[: len(h) - k] @ h[k:]
-    return found
+        covariance[k] = h[: len(h) - k] @ h[k:]
+    return covariance
 
 
 def _stable(a: Floats) -> Floats:
@@ -389,7 +389,7 @@ def _strongest_line(values: Floats) -> float | None:
     fine = np.abs(np.fft.rfft(values, _PADDED * count)) ** 2
     near = slice(max(_PADDED * (strongest - 1), 1), _PADDED * (strongest + 1) + 1)
     peak = near.start + int(np.argmax(fine[near]))
-    left, middle, right = fine[peak - 1], fine[peak], fine[min(peak + 1, len(fine) - 1)]
-    bend = left - 2.0 * middle + right
-    off = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    before, middle, right = fine[peak - 1], fine[peak], fine[min(peak + 1, len(fine) - 1)]
+    bend = before - 2.0 * middle + right
+    off = 0.5 * (before - right) / bend if bend < 0.0 else 0.0
     return float((peak + np.clip(off, -0.5, 0.5)) / (_PADDED * count))

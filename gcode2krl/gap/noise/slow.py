@@ -68,8 +68,8 @@ def explaining_columns(traces: Sequence[Trace]) -> Iterator[list[Floats]]:
     shared = [np.column_stack(own) for own in zip(*parts, strict=True)]
     for j in range(traces[0].shape[1]):
         yield [
-            np.column_stack([common, *_of_component(each, j)])
-            for each, common in zip(inputs, shared, strict=True)
+            np.column_stack([common, *_of_component(inputs_of_trace, j)])
+            for inputs_of_trace, common in zip(inputs, shared, strict=True)
         ]
 
 
@@ -216,8 +216,8 @@ def slow_parts_of(means: BlockMeans, floor: float = 0.0) -> tuple[SlowPart, ...]
 
 def _seen(means: BlockMeans, basis: Floats) -> float:
     """Return the rms of the data beside a basis: slow noise is never more, however few its waves."""
-    rest = means.values - basis @ (basis.T @ means.values)
-    return rms(rest)
+    unexplained = means.values - basis @ (basis.T @ means.values)
+    return rms(unexplained)
 
 
 def _explained(fit: "_Fit", basis: Floats, peak: _Peak) -> tuple[Floats, _Peak]:
@@ -314,21 +314,21 @@ class _Fit:
         white = self._white(basis, parts, kept)
         gram, width, determinant = white.gram, basis.shape[1], white.determinant
         if more is not None:
-            own = self._filter(parts, kept).applied(more, self.means.segments)
-            cross = own.T @ white.columns
+            filtered = self._filter(parts, kept).applied(more, self.means.segments)
+            cross = filtered.T @ white.columns
             gram = np.block(
                 [
                     [gram[:width, :width], cross[:, :width].T, gram[:width, width:]],
-                    [cross[:, :width], own.T @ own, cross[:, width:]],
+                    [cross[:, :width], filtered.T @ filtered, cross[:, width:]],
                     [gram[width:, :width], cross[:, width:].T, gram[width:, width:]],
                 ]
             )
         information, cross = gram[:-1, :-1], gram[:-1, -1]
         ridge = _RANK * np.diag(np.diag(information))
-        left = max(float(gram[-1, -1] - cross @ np.linalg.solve(information + ridge, cross)), 1e-300)
+        variance = max(float(gram[-1, -1] - cross @ np.linalg.solve(information + ridge, cross)), 1e-300)
         count = len(basis) - width
-        cost = count * np.log(left / count) + self._filter(parts, kept).log_determinant + determinant
-        return _Peak(parts, float(cost), left / count)
+        cost = count * np.log(variance / count) + self._filter(parts, kept).log_determinant + determinant
+        return _Peak(parts, float(cost), variance / count)
 
     def _white(self, basis: Floats, parts: tuple[_Part, ...], kept: float) -> "_White":
         """Return a basis and the data as innovations, once as long as no other basis is asked for."""
@@ -371,14 +371,14 @@ class _Fit:
         Data of few waves tell σ²/τ and hardly τ; a memory that is taken too short makes the rest a gap.
         """
         (tau, ratio), others = peak.parts[0], peak.parts[1:]
-        found = peak
+        longest = peak
         for longer in range(tau + 1, len(_TIME_CONSTANTS_S)):
             grown = 4.0 * np.log10(_TIME_CONSTANTS_S[longer] / _TIME_CONSTANTS_S[tau])
             at = min(ratio + round(float(grown)), len(_RATIOS) - 1)
             trial = self.peak(basis, ((longer, at), *others))
             if trial.cost < peak.cost + _LIMITS.noise_as_likely:
-                found = trial
-        return found
+                longest = trial
+        return longest
 
     def needs_slow(self, basis: Floats, peak: _Peak, gain: float = _LIMITS.noise_slow_gain) -> bool:
         """Tell whether a slow part does better than any short one."""
@@ -408,9 +408,9 @@ class _Fit:
             return set()
         columns = self.whitened(np.ascontiguousarray(self.means.candidates[:, self.usable]), parts)
         whole = np.sum(columns**2, axis=0)
-        left = whole - np.sum((basis.T @ columns) ** 2, axis=0)
-        gain = (columns.T @ y) ** 2 / np.maximum(left, 1e-300)
-        gain[left < _LIMITS.noise_least_seen * whole] = 0.0
+        power_left = whole - np.sum((basis.T @ columns) ** 2, axis=0)
+        gain = (columns.T @ y) ** 2 / np.maximum(power_left, 1e-300)
+        gain[power_left < _LIMITS.noise_least_seen * whole] = 0.0
         return {int(self.usable[int(np.argmax(gain))])}
 
     def _strongest(self, y: Floats) -> set[float]:
@@ -526,8 +526,8 @@ def block_means(
         y = [each.means(rows[:, j]) for each, rows in zip(blocks, residuals, strict=True)]
         signed = [each.means(columns[j]) for each, columns in zip(blocks, signatures, strict=True)]
         usual = [
-            each.means(_joined([one.columns[j] for one in own], len(trace.time_s)))
-            for each, own, trace in zip(blocks, nuisance, traces, strict=True)
+            starts.means(_joined([one.columns[j] for one in mismatch], len(trace.time_s)))
+            for starts, mismatch, trace in zip(blocks, nuisance, traces, strict=True)
         ]
         known = _stacked([*zip(map(_trend, numbers), usual, strict=True)], nuisance)
         smooth = [each.means(own) for each, own in zip(blocks, inputs, strict=True)]
@@ -548,8 +548,8 @@ def _component(
     if not repeats:
         return BlockMeans(values, _segments(numbers), known, candidates, _runs(lengths))
     common = numbers[0]
-    for each in numbers[1:]:
-        common = np.intersect1d(common, each)
+    for number in numbers[1:]:
+        common = np.intersect1d(common, number)
     firsts = np.cumsum([0, *lengths[:-1]])
     rows = [first + np.flatnonzero(np.isin(own, common)) for first, own in zip(firsts, numbers, strict=True)]
     contrasts = _contrasts(len(rows))
@@ -579,24 +579,24 @@ def _contrasts(runs: int) -> Floats:
 
 def _segments(numbers: Sequence[Ints]) -> Ints:
     """Return (s, 2) the stretches of consecutive blocks, those of each run by themselves."""
-    found, first = [], 0
-    for own in numbers:
-        breaks = np.flatnonzero(np.diff(own) > 1) + 1
-        edges = first + np.concatenate([[0], breaks, [len(own)]])
-        found += [(a, b) for a, b in pairwise(edges.tolist()) if b > a]
-        first += len(own)
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+    segments, first = [], 0
+    for number in numbers:
+        breaks = np.flatnonzero(np.diff(number) > 1) + 1
+        edges = first + np.concatenate([[0], breaks, [len(number)]])
+        segments += [(a, b) for a, b in pairwise(edges.tolist()) if b > a]
+        first += len(number)
+    return np.array(segments, dtype=np.int64).reshape(-1, 2)
 
 
 def _joined(columns: Sequence[Floats], count: int) -> Floats:
     return np.concatenate([np.zeros((count, 0)), *columns], axis=1)
 
 
-def _stacked(own: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence[Nuisance]]) -> Floats:
+def _stacked(means: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence[Nuisance]]) -> Floats:
     """Return what is never noise: each run's constant and trend, and mismatch, that of machines shared."""
-    trends = _block_diagonal([trend for trend, _ in own])
+    trends = _block_diagonal([trend for trend, _ in means])
     shared, single = [], []
-    for (_, usual), items in zip(own, nuisance, strict=True):
+    for (_, usual), items in zip(means, nuisance, strict=True):
         widths = [each.columns.shape[2] for each in items]
         is_shared = np.repeat([each.shared for each in items], widths).astype(bool)
         shared.append(usual[:, is_shared])
@@ -610,9 +610,9 @@ def _stacked(own: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence[N
 def _block_diagonal(parts: Sequence[Floats]) -> Floats:
     whole = np.zeros((sum(len(each) for each in parts), sum(each.shape[1] for each in parts)))
     row = column = 0
-    for each in parts:
-        whole[row : row + len(each), column : column + each.shape[1]] = each
-        row, column = row + len(each), column + each.shape[1]
+    for part in parts:
+        whole[row : row + len(part), column : column + part.shape[1]] = part
+        row, column = row + len(part), column + part.shape[1]
     return whole
 
 

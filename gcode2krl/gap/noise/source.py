@@ -113,7 +113,7 @@ def _in_few_joints(trace: Trace, has: Sequence[object]) -> bool:
     return trace.of_six_encoders and sum(map(bool, has)) < _ALIKE_SHARE * len(has)
 
 
-def _spikes(trace: Trace, rest: Floats) -> Floats:
+def _spikes(trace: Trace, residual: Floats) -> Floats:
     """Return what of a rest (n, k) is far from its level for a moment, beyond a bridge from row to row.
 
     The level lies between the medians of half a second before and after: it follows steps and whatever is
@@ -123,10 +123,10 @@ def _spikes(trace: Trace, rest: Floats) -> Floats:
     length = max(1, round(_LEVEL_S / usual_step_s(time_s)))
     count = len(time_s) // length
     if count < 2 * _LEVELS:
-        return np.zeros_like(rest)
+        return np.zeros_like(residual)
     block = np.minimum(np.arange(len(time_s)) // length, count - 1)
-    spikes = np.empty_like(rest)
-    for j, values in enumerate(rest.T):
+    spikes = np.empty_like(residual)
+    for j, values in enumerate(residual.T):
         medians = np.median(values[: count * length].reshape(count, length), axis=1)
         padded = np.pad(medians, _LEVELS, mode="edge")
         levels = np.median(np.lib.stride_tricks.sliding_window_view(padded, _LEVELS), axis=1)
@@ -162,9 +162,13 @@ class _Explained:
         width = sum(part.shape[2] for part in parts)
         self._columns = [list(_runs_of_columns(parts, j)) for j in range(trace.shape[1])]
         gram = np.zeros((width, width))
-        for own in self._columns:
-            used = np.concatenate([np.zeros(0, dtype=int), *(np.arange(at.start, at.stop) for at, _ in own)])
-            columns = np.concatenate([np.zeros((len(trace.time_s), 0)), *(run for _, run in own)], axis=1)
+        for of_component in self._columns:
+            used = np.concatenate(
+                [np.zeros(0, dtype=int), *(np.arange(at.start, at.stop) for at, _ in of_component)]
+            )
+            columns = np.concatenate(
+                [np.zeros((len(trace.time_s), 0)), *(run for _, run in of_component)], axis=1
+            )
             gram[np.ix_(used, used)] += columns.T @ columns
         self._kept = np.flatnonzero(np.diag(gram))
         self._scale = np.sqrt(np.diag(gram)[self._kept])
@@ -182,14 +186,14 @@ class _Explained:
         if not len(self._kept):
             return values
         sums = np.zeros(self._width)
-        for j, own in enumerate(self._columns):
-            for at, columns in own:
+        for j, of_component in enumerate(self._columns):
+            for at, columns in of_component:
                 sums[at] += columns.T @ values[:, j]
         weights = np.zeros(self._width)
         weights[self._kept] = np.linalg.solve(self._gram, sums[self._kept] / self._scale) / self._scale
         unexplained = values.copy()
-        for j, own in enumerate(self._columns):
-            for at, columns in own:
+        for j, of_component in enumerate(self._columns):
+            for at, columns in of_component:
                 unexplained[:, j] -= columns @ weights[at]
         return unexplained
 
@@ -256,14 +260,14 @@ class _Source:
         """
         rests = self._rests(values)
         drawn = [self._rests(each) for each in slow_drawn]
-        found = []
+        models = []
         for j, (floor, parts) in enumerate(zip(floors, slow, strict=True)):
             off = [own for each in drawn for own in self._component(each, j)] if parts else []
             # what is commanded has no instrument: where its model is off, at corners, it is so of all rows
             every_row = not self.traces[0].link.has_instrument
             short = fit(self._component(rests, j), floor, off, every_row=every_row)
-            found.append(replace(short, slow=parts))
-        return found
+            models.append(replace(short, slow=parts))
+        return models
 
     def _rests(self, values: Sequence[Floats]) -> list[Floats]:
         """Return values (n, k) less all that is or may be structure."""
@@ -276,8 +280,8 @@ class _Source:
         """Return one component (n,) of each trace with its segments, less tones and repeats' mean."""
         values = [rest[:, j] for rest in rests]
         if self.repeats is None:
-            own = zip(values, self.traces, strict=True)
-            return [(without_lines(value), trace.segments) for value, trace in own]
+            pairs = zip(values, self.traces, strict=True)
+            return [(without_lines(value), trace.segments) for value, trace in pairs]
         differences = _differences(values, self.repeats)
         return [(without_lines(value), self.traces[0].segments) for value in differences]
 
@@ -296,12 +300,12 @@ def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
 
 
 def _is_repeat(trace: Trace, first: Trace) -> bool:
-    one, other = trace.inputs, first.inputs
-    if len(one) != len(other) or trace.shape[1] != first.shape[1]:
+    inputs, other = trace.inputs, first.inputs
+    if len(inputs) != len(other) or trace.shape[1] != first.shape[1]:
         return False
     # with relative angles every tip is zero, and the joints tell the programs apart
-    tips = np.allclose(one.position_mm, other.position_mm, atol=_SAME_MM)
-    return tips and np.allclose(one.q_cmd_rad, other.q_cmd_rad, atol=_SAME_RAD)
+    tips = np.allclose(inputs.position_mm, other.position_mm, atol=_SAME_MM)
+    return tips and np.allclose(inputs.q_cmd_rad, other.q_cmd_rad, atol=_SAME_RAD)
 
 
 def _differences(values: Sequence[Floats], rows: Sequence[Ints]) -> Floats:
@@ -345,9 +349,11 @@ def revisits(traces: Sequence[Trace]) -> Floats:
         came = np.append(True, apart[np.arange(1, len(q)), np.arange(len(q) - 1)])
         number = np.argmin(apart, axis=0)  # the first row of the same pose
         for pose in np.unique(number):
-            own = trace.residual[came & (number == pose)]
-            if len(own) > 1:
-                differences.append((own - own.mean(axis=0)) * np.sqrt(len(own) / (len(own) - 1.0)))
+            at_pose = trace.residual[came & (number == pose)]
+            if len(at_pose) > 1:
+                differences.append(
+                    (at_pose - at_pose.mean(axis=0)) * np.sqrt(len(at_pose) / (len(at_pose) - 1.0))
+                )
     return np.concatenate(differences)
 
 
@@ -363,10 +369,10 @@ def _learnt(
         return rms(revisits(traces))
     values = sum(trace.measured.size for trace in traces)
     rests, spanned = [], 0
-    for trace, own, others in zip(traces, signatures, nuisance, strict=True):
-        basis = _basis(_flat([own, *(each.columns for each in others)]))
-        rest = trace.residual.T.reshape(-1)
-        rests.append(rest - basis @ (basis.T @ rest))
+    for trace, signature, others in zip(traces, signatures, nuisance, strict=True):
+        basis = _basis(_flat([signature, *(each.columns for each in others)]))
+        residual = trace.residual.T.reshape(-1)
+        rests.append(residual - basis @ (basis.T @ residual))
         spanned += basis.shape[1]
     if 3 * (values - spanned) < values:
         return _few(traces, signatures, nuisance)
@@ -388,11 +394,11 @@ def _few(
     sigmas = rms(turned[:, -1]) * _SIGMAS
     count, taken = len(turned), list[int]()
     while True:
-        whole, beside = _costs(turned, variances, sigmas, taken)
-        best, column = float(whole.min()), int(np.argmin(beside.min(axis=0)))
+        whole, explained = _costs(turned, variances, sigmas, taken)
+        best, column = float(whole.min()), int(np.argmin(explained.min(axis=0)))
         freedom = count - len(taken) - 1
-        f = freedom * np.expm1(max(best - float(beside[:, column].min()), 0.0) / count)
-        if 3 * freedom < count or fdtrc(1, freedom, f) * beside.shape[1] > _LIMITS.poses_chance:
+        f = freedom * np.expm1(max(best - float(explained[:, column].min()), 0.0) / count)
+        if 3 * freedom < count or fdtrc(1, freedom, f) * explained.shape[1] > _LIMITS.poses_chance:
             return float(sigmas[int(np.argmin(whole))]) * float(np.sqrt(count / (freedom + 1)))
         taken.append(column)
 
@@ -401,30 +407,30 @@ def _turned(
     traces: Sequence[Trace], signatures: Sequence[Floats], nuisance: Sequence[Sequence[Nuisance]]
 ) -> Iterator[tuple[Floats, Floats]]:
     """Yield of each trace columns (v, c + 1), the residual last, along nuisance's axes, and its variances."""
-    for trace, own, others in zip(traces, signatures, nuisance, strict=True):
-        usual = _flat([np.zeros((*own.shape[:2], 0)), *(each.columns for each in others)])
+    for trace, signature, others in zip(traces, signatures, nuisance, strict=True):
+        usual = _flat([np.zeros((*signature.shape[:2], 0)), *(each.columns for each in others)])
         variances, axes = np.linalg.eigh(usual @ usual.T)
         yield (
-            axes.T @ np.column_stack([_flat([own]), trace.residual.T.reshape(-1)]),
+            axes.T @ np.column_stack([_flat([signature]), trace.residual.T.reshape(-1)]),
             np.maximum(variances, 0.0),
         )
 
 
 def _costs(turned: Floats, variances: Floats, sigmas: Floats, taken: Sequence[int]) -> tuple[Floats, Floats]:
     """Return -2 log likelihood at some noises (s,), beside taken columns, and with one more each (s, c)."""
-    whole, beside = [], []
+    whole, explained = [], []
     for sigma in sigmas:
         total = sigma**2 + variances
         white_ = turned / np.sqrt(total)[:, None]
         basis = _basis(white_[:, taken])
         white_ = white_ - basis @ (basis.T @ white_)
-        columns, rest = white_[:, :-1], white_[:, -1]
+        columns, residual = white_[:, :-1], white_[:, -1]
         power = np.sum(columns**2, axis=0)
-        gain = (columns.T @ rest) ** 2 / np.maximum(power, 1e-300)
+        gain = (columns.T @ residual) ** 2 / np.maximum(power, 1e-300)
         gain[power <= _RANK * np.sum((turned[:, :-1] ** 2) / total[:, None], axis=0)] = 0.0
-        whole.append(float(np.sum(np.log(total)) + rest @ rest))
-        beside.append(whole[-1] - gain)
-    return np.array(whole), np.array(beside)
+        whole.append(float(np.sum(np.log(total)) + residual @ residual))
+        explained.append(whole[-1] - gain)
+    return np.array(whole), np.array(explained)
 
 
 def _flat(columns: Sequence[Floats]) -> Floats:
@@ -436,8 +442,8 @@ def _flat(columns: Sequence[Floats]) -> Floats:
 def _basis(columns: Floats) -> Floats:
     """Return an orthonormal basis (v, r) of what columns (v, c) span."""
     scale = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
-    return left[:, singular > _RANK * singular.max(initial=0.0)]
+    vectors, singular, _ = np.linalg.svd(columns[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
+    return vectors[:, singular > _RANK * singular.max(initial=0.0)]
 
 
 _COMPARE_LIMITS = THRESHOLDS.beside
@@ -449,14 +455,14 @@ _ROUNDING = 1e-12
 
 def strongest_moments(traces: Sequence[Trace], low_s: float, high_s: float) -> tuple[float, ...]:
     """Return the moments of the clearest jumps, in s since the earliest run started, the clearest first."""
-    found = [
+    jumps_of_runs = [
         (jump, trace.inputs.hours * S_PER_H + float(trace.time_s[row]), half_s)
         for trace in traces
         for half_s in _COMPARE_LIMITS.jump_halves_s
         for row, jump in _peaks(trace, half_s)
     ]
     moments: list[float] = []
-    for _, at_s, half_s in sorted(found, reverse=True):
+    for _, at_s, half_s in sorted(jumps_of_runs, reverse=True):
         apart = all(abs(at_s - other) > half_s for other in moments)
         if apart and low_s <= at_s <= high_s and len(moments) < _COMPARE_LIMITS.jumps:
             moments.append(at_s)
@@ -500,8 +506,8 @@ def jumps(values: Floats, half: int) -> Floats:
     power = _moving(values**2, np.ones(2 * half))
     explained = sum(_moving(values, each) ** 2 for each in smooth.T)
     taken = _moving(values, jump)
-    rest = np.maximum(power - explained, _ROUNDING * max(float(power.max()), 1e-300))
-    share = np.minimum(taken**2 / rest, 1.0 - _ROUNDING)
+    unexplained = np.maximum(power - explained, _ROUNDING * max(float(power.max()), 1e-300))
+    share = np.minimum(taken**2 / unexplained, 1.0 - _ROUNDING)
     clear = np.zeros(len(values))
     clear[half : half + len(share)] = -2.0 * half * np.log1p(-share)
     return clear
@@ -509,5 +515,5 @@ def jumps(values: Floats, half: int) -> Floats:
 
 def _moving(values: Floats, kernel: Floats) -> Floats:
     """Return the inner product of a kernel with each window of (n,)."""
-    found: Floats = fftconvolve(values, kernel[::-1], mode="valid")
-    return found
+    sums: Floats = fftconvolve(values, kernel[::-1], mode="valid")
+    return sums

@@ -61,13 +61,13 @@ class Part(NamedTuple):
     variance: float
 
 
-def constancy_of(found: Examination, number: int) -> Constancy | None:
+def constancy_of(examination: Examination, number: int) -> Constancy | None:
     """Return the constancy of an accepted effect over the division of the data in which it is least.
 
     p is that of the spread's chi2 (Cochran 1954), times the number of divisions (Bonferroni). None where the
     effect acts in one part of the data only.
     """
-    divisions = [each for each in _divisions(found, number) if any(len(group) > 1 for group in each)]
+    divisions = [each for each in _divisions(examination, number) if any(len(group) > 1 for group in each)]
     if not divisions:
         return None
     spreads = [_spread(groups) for groups in divisions]
@@ -75,29 +75,30 @@ def constancy_of(found: Examination, number: int) -> Constancy | None:
     return Constancy(inconstancy=worst.inconstancy, p=min(1.0, len(spreads) * worst.p))
 
 
-def spread_between_runs(found: Examination, number: int) -> tuple[float, int]:
+def spread_between_runs(examination: Examination, number: int) -> tuple[float, int]:
     """Return the spread of an effect's size between runs beyond noise, as a share, and the count of runs."""
-    parts = _by_run(_Residual.of(found, number))
+    parts = _by_run(_Residual.of(examination, number))
     return (_spread([parts]).inconstancy, len(parts)) if len(parts) > 1 else (0.0, len(parts))
 
 
-def _divisions(found: Examination, number: int) -> Iterator[list[list[Part]]]:
+def _divisions(examination: Examination, number: int) -> Iterator[list[list[Part]]]:
     """Yield groups of parts whose sizes should be one number within each group."""
-    residual = _Residual.of(found, number)
-    usual = _usual_share(found, number)
+    residual = _Residual.of(examination, number)
+    usual = _usual_share(examination, number)
     yield [[Part(part.share, part.variance + usual**2) for part in _by_run(residual)]]
-    yield [_halves(residual, run) for run in range(len(found.traces))]
-    if found.link.of_joints and found.applied[number].effect.is_clock:
-        yield [_by_joint(residual, found.traces[0].shape[1])]
+    yield [_halves(residual, run) for run in range(len(examination.traces))]
+    if examination.link.of_joints and examination.applied[number].effect.is_clock:
+        joints = range(examination.traces[0].shape[1])
+        yield [_kept([residual.part(residual.component == joint) for joint in joints])]
 
 
-def _usual_share(found: Examination, number: int) -> float:
+def _usual_share(examination: Examination, number: int) -> float:
     """Return how much normal mismatch of its form lets an effect vary from run to run, as a share of it."""
-    applied, trace = found.applied[number], found.traces[0]
-    if not found.likelihood.own_alike(applied):
+    applied, trace = examination.applied[number], examination.traces[0]
+    if not examination.likelihood.own_alike(applied):
         return 0.0
     duration_s = float(trace.time_s[-1] - trace.time_s[0])
-    bounds = applied.effect.usual(found.question.mismatch, duration_s, found.question.clocks)
+    bounds = applied.effect.usual(examination.question.mismatch, duration_s, examination.question.clocks)
     nominal = applied.effect.nominal(trace.inputs, applied.target)
     largest = max(
         (abs(applied[name] - nominal[name]) / bound for name, bound in bounds.items() if bound > 0.0),
@@ -125,28 +126,28 @@ class _Residual:
     """(runs,) of a clock what was taken off the stamps of each run already, as a share of it."""
 
     @classmethod
-    def of(cls, found: Examination, number: int) -> "_Residual":
+    def of(cls, examination: Examination, number: int) -> "_Residual":
         """Return the residual beside an accepted effect."""
-        likelihood, applied, traces = found.likelihood, found.applied, found.traces
+        likelihood, applied, traces = examination.likelihood, examination.applied, examination.traces
         change = likelihood.whiten(
-            [trace.sample(applied) - trace.sample(found.without(number)) for trace in traces]
+            [trace.sample(applied) - trace.sample(examination.without(number)) for trace in traces]
         )
-        left = likelihood.residual(applied)[: len(change)]
+        residual = likelihood.residual(applied)[: len(change)]
         shapes = [trace.shape for trace in traces]
         return cls(
-            left,
+            residual,
             change,
             likelihood.own_nuisance(applied[number]),
             np.concatenate([np.full(n * k, run) for run, (n, k) in enumerate(shapes)]),
             np.concatenate([np.tile(trace.time_s, trace.shape[1]) for trace in traces]),
             np.concatenate([np.repeat(np.arange(k), n) for n, k in shapes]),
-            sensitivity_of(likelihood, found.fitted, number).inflation(),
-            _set_shares(found, number),
+            sensitivity_of(likelihood, examination.fitted, number).inflation(),
+            _set_shares(examination, number),
         )
 
     def part(self, rows: Bools) -> Part | None:
         """Return the effect's share in some rows; None where it does next to nothing there."""
-        change, left = self.change[rows], self.left[rows]
+        change, residual = self.change[rows], self.left[rows]
         whole = float(self.change @ self.change)
         if not rows.any() or float(change @ change) < _LIMITS.least_part * whole:
             return None
@@ -156,15 +157,15 @@ class _Residual:
         information = float(change @ change - on_change @ explained[:, 0])
         if information < _LIMITS.least_part * float(change @ change):  # the run's own mismatch does the same
             return None
-        share = float(change @ left - on_change @ explained[:, 1]) / information
+        share = float(change @ residual - on_change @ explained[:, 1]) / information
         return Part(share, self.inflation / information)
 
 
-def _set_shares(found: Examination, number: int) -> Floats:
+def _set_shares(examination: Examination, number: int) -> Floats:
     """Return by which share of a clock each run's stamps (runs,) were moved before it was fitted."""
-    applied = found.applied[number]
+    applied = examination.applied[number]
     offset_s = applied[applied.effect.sizes[0].name] if applied.effect.is_clock else 0.0
-    moved_s = np.array([trace.clock_set_s for trace in found.traces])
+    moved_s = np.array([trace.clock_set_s for trace in examination.traces])
     return moved_s / offset_s if offset_s != 0.0 else np.zeros(len(moved_s))
 
 
@@ -180,16 +181,12 @@ def _by_run(residual: _Residual) -> list[Part]:
 
 def _halves(residual: _Residual, run: int) -> list[Part]:
     """Return both halves of a run, in which an effect does as much."""
-    own = residual.run == run
-    order = np.argsort(residual.time_s[own], kind="stable")
-    power = np.cumsum(residual.change[own][order] ** 2)
-    middle_s = residual.time_s[own][order][int(np.searchsorted(power, power[-1] / 2.0))]
+    of_run = residual.run == run
+    order = np.argsort(residual.time_s[of_run], kind="stable")
+    power = np.cumsum(residual.change[of_run][order] ** 2)
+    middle_s = residual.time_s[of_run][order][int(np.searchsorted(power, power[-1] / 2.0))]
     early = residual.time_s <= middle_s
-    return _kept([residual.part(own & early), residual.part(own & ~early)])
-
-
-def _by_joint(residual: _Residual, joints: int) -> list[Part]:
-    return _kept([residual.part(residual.component == joint) for joint in range(joints)])
+    return _kept([residual.part(of_run & early), residual.part(of_run & ~early)])
 
 
 # Spread
@@ -228,28 +225,28 @@ class Interval(NamedTuple):
     high: float
 
 
-def intervals_of(found: Examination) -> list[dict[str, Interval]]:
+def intervals_of(examination: Examination) -> list[dict[str, Interval]]:
     """Return the interval of every parameter of every accepted effect.
 
     Quantiles of draws from the fit's covariance, added in quadrature to the errors of models and to what the
     effect's size differs by from run to run. A size that was held has the interval that it would have if it
     were free; a shape that was held was not found, and has none.
     """
-    if not found.applied:
+    if not examination.applied:
         return []
-    draws = _draws(found.fitted, covariance_of(found.likelihood, found.fitted))
-    intervals = [_effect_intervals(found, number, draws) for number in range(len(found.applied))]
-    if not any(each.held for each in found.applied):
+    draws = _draws(examination.fitted, covariance_of(examination.likelihood, examination.fitted))
+    intervals = [_effect_intervals(examination, number, draws) for number in range(len(examination.applied))]
+    if not any(each.held for each in examination.applied):
         return intervals
-    free = replace(found, fitted=_freed(found.fitted, found.traces[0]))
+    free = replace(examination, fitted=_freed(examination.fitted, examination.traces[0]))
     wide = intervals_of(free)
     return [
         {
-            name: wide[number][name] if name in applied.held else own
-            for name, own in intervals[number].items()
+            name: wide[number][name] if name in applied.held else interval
+            for name, interval in intervals[number].items()
             if name not in applied.held or not applied.effect.parameter(name).is_shape
         }
-        for number, applied in enumerate(found.applied)
+        for number, applied in enumerate(examination.applied)
     ]
 
 
@@ -270,13 +267,13 @@ def _draws(fitted: Fitted, covariance: Floats) -> Floats:
     return draws
 
 
-def _effect_intervals(found: Examination, number: int, draws: Floats) -> dict[str, Interval]:
+def _effect_intervals(examination: Examination, number: int, draws: Floats) -> dict[str, Interval]:
     """Return the interval of each parameter of an accepted effect."""
-    numbers, values = found.fitted.numbers, found.applied[number].values
-    free, own = numbers.free[number], draws[:, numbers.slices[number]]
-    drawn = [free.applied(x).values for x in np.clip(own, free.low, free.high)]
+    numbers, values = examination.fitted.numbers, examination.applied[number].values
+    free, of_effect = numbers.free[number], draws[:, numbers.slices[number]]
+    drawn = [free.applied(x).values for x in np.clip(of_effect, free.low, free.high)]
     share = _LIMITS.law_error if free.effect.plans_anew else _LIMITS.model_error
-    mismatch, between = _mismatch(found, number), _between_runs(found, number)
+    mismatch, between = _mismatch(examination, number), _between_runs(examination, number)
     return {
         name: _interval(
             free.effect.parameter(name),
@@ -288,27 +285,27 @@ def _effect_intervals(found: Examination, number: int, draws: Floats) -> dict[st
     }
 
 
-def _between_runs(found: Examination, number: int) -> float:
+def _between_runs(examination: Examination, number: int) -> float:
     """Return the half-width, as a share, that the spread between runs adds to a clock.
 
     Student's quantile of the mean over the runs.
     """
-    applied = found.applied[number]
-    if not applied.effect.is_clock or not found.likelihood.own_alike(applied):
+    applied = examination.applied[number]
+    if not applied.effect.is_clock or not examination.likelihood.own_alike(applied):
         return 0.0
-    spread, runs = spread_between_runs(found, number)
+    spread, runs = spread_between_runs(examination, number)
     return float(stats.t.ppf(_ENDS[1], runs - 1) * spread / runs**0.5) if runs > 1 else 0.0
 
 
-def _mismatch(found: Examination, number: int) -> dict[str, float]:
+def _mismatch(examination: Examination, number: int) -> dict[str, float]:
     """Return the half-widths that normal mismatch of the same form adds to an effect in a joint.
 
     It is nuisance of the covariance at its own small size, which at that of the effect has another shape.
     """
-    effect = found.applied[number].effect
-    if not found.link.of_joints or found.link.tells_time or not effect.is_nuisance:
+    effect = examination.applied[number].effect
+    if not examination.link.of_joints or examination.link.tells_time or not effect.is_nuisance:
         return {}
-    bounds = effect.usual(found.question.mismatch, 1.0)
+    bounds = effect.usual(examination.question.mismatch, 1.0)
     return {name: _LIMITS.inside_bound * bound for name, bound in bounds.items()}
 
 
@@ -441,9 +438,9 @@ class Rest:
         And less those of one stretch of time: a function shows in others too, and only a step need not.
         """
         own_time = (
-            max(each.nats, 0.0)
-            for each in self.study.evidences
-            if each.on is Dependence.RUN_TIME and each.place.component == evidence.place.component
+            max(other.nats, 0.0)
+            for other in self.study.evidences
+            if other.on is Dependence.RUN_TIME and other.place.component == evidence.place.component
         )
         one_share = 0.0 if evidence.on is Dependence.RUN_TIME_STEP else evidence.in_one
         others_nats = evidence.nats - 0.5 * evidence.gain * one_share
@@ -465,17 +462,19 @@ NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0)
 class LinkFamilies:
     """The families of a link: what each says beside all accepted effects, and with each cause taken out."""
 
-    def __init__(self, found: Examination, traces: Sequence[Trace]) -> None:
+    def __init__(self, examination: Examination, traces: Sequence[Trace]) -> None:
         """Take the traces that explain and those that are held out."""
-        nuisance = nuisance_for(traces, found.question, found.data.known)
-        likelihood = Likelihood(traces, nuisance, found.noise)
-        self._found, self._rows = found, Rows(likelihood)
-        tangents = likelihood.tangents(found.fitted.numbers, found.fitted.x)
-        self._whole = View.of(self._rows, self._left(found.applied), tangents)
-        self._grid = Grid(traces, [noise.sigma for noise in found.noise])
-        numbers = found.cause_numbers
+        nuisance = nuisance_for(traces, examination.question, examination.data.known)
+        likelihood = Likelihood(traces, nuisance, examination.noise)
+        self._found, self._rows = examination, Rows(likelihood)
+        tangents = likelihood.tangents(examination.fitted.numbers, examination.fitted.x)
+        self._whole = View.of(self._rows, self._left(examination.applied), tangents)
+        self._grid = Grid(traces, [noise.sigma for noise in examination.noise])
+        numbers = examination.cause_numbers
         outs = [self._without((number,)) for number in numbers]
-        everything, *self._outs = studies(self._rows, [self._whole, *outs], self._grid, found.question.seed)
+        everything, *self._outs = studies(
+            self._rows, [self._whole, *outs], self._grid, examination.question.seed
+        )
         self._bare = self._without(numbers)
         self.rest = Rest(
             everything,
@@ -514,31 +513,35 @@ class LinkFamilies:
     def _without(self, numbers: Sequence[int]) -> View:
         """Return the view with some accepted effects taken out of the model, the others where they are."""
         kept = [number for number in range(len(self._found.applied)) if number not in numbers]
-        left = [each.T[:, :, None] for each in self._left([self._found.applied[number] for number in kept])]
+        residuals = [
+            each.T[:, :, None] for each in self._left([self._found.applied[number] for number in kept])
+        ]
         slices = self._found.fitted.numbers.slices
         columns = [np.arange(slices[number].start, slices[number].stop) for number in kept]
         at = np.concatenate([np.zeros(0, dtype=int), *columns])
-        return self._whole.beside(self._rows.of(left)[:, 0], self._whole.tangents[:, at])
+        return self._whole.beside(self._rows.of(residuals)[:, 0], self._whole.tangents[:, at])
 
-    def _gap_gain(self, beside: Sequence[Evidence], component: int | None) -> float:
+    def _gap_gain(self, evidences: Sequence[Evidence], component: int | None) -> float:
         """Return the fall of chi2 by all causes and the best family beside them, in one component or all."""
         explained = self._bare.at(component).chi2 - self._whole.at(component).chi2
-        return explained + max((net_gain(each) for each in beside), default=0.0)
+        return explained + max((net_gain(each) for each in evidences), default=0.0)
 
     def _tests(self, number: int, out: View, study: Study) -> FamilyTests:
         applied = self._found.applied[number]
-        own = [each for each in study.evidences if _is_of(applied, each)]
+        of_cause = [each for each in study.evidences if _is_of(applied, each)]
         better = next((each for each in study.evidences if not _is_of(applied, each)), None)
         form = out.chi2 - self._whole.chi2
         form_nats = 0.5 * form - 0.5 * self._cost(out, number)
         margin = np.inf
         if better is not None:
-            best = max([form_nats, *(each.nats for each in own)])
+            best = max([form_nats, *(each.nats for each in of_cause)])
             margin = (best - better.nats) / (better.inflation if better.nats > best else 1.0)
-        rest = self.rest.study
-        own_rest = max((net_gain(each) for each in rest.evidences if _is_of(applied, each)), default=0.0)
+        study_of_rest = self.rest.study
+        own_rest = max(
+            (net_gain(each) for each in study_of_rest.evidences if _is_of(applied, each)), default=0.0
+        )
         components = self._components(number)
-        near = [each for each in rest.evidences if _is_in(components, each)]
+        near = [each for each in study_of_rest.evidences if _is_in(components, each)]
         other = max((each for each in near if not _is_of(applied, each)), key=net_gain, default=None)
         if other is not None and net_gain(other) <= own_rest:
             other = None  # its own family takes more of the same: it is of another form, not beside another
@@ -548,32 +551,32 @@ class LinkFamilies:
             form_ratio=form / max(form + own_rest, 1e-30),
             other_share=0.0 if other is None else min(net_gain(other) / max(gap_gain, 1e-30), 1.0),
             other_power=0.0 if other is None else self._power_share(other, number),
-            other_p=1.0 if other is None else rest.p_of(other),
-            family=own[0] if own else None,
-            family_behind=(form_nats - own[0].nats) / own[0].inflation if own else None,
+            other_p=1.0 if other is None else study_of_rest.p_of(other),
+            family=of_cause[0] if of_cause else None,
+            family_behind=(form_nats - of_cause[0].nats) / of_cause[0].inflation if of_cause else None,
             better=better,
             components=components,
         )
 
     def _components(self, number: int) -> frozenset[int]:
         """Return the components of the signal that an accepted effect moves."""
-        applied, rest = self._found.applied, self._found.without(number)
+        applied, others = self._found.applied, self._found.without(number)
         power = sum(
-            np.sum((trace.sample(applied) - trace.sample(rest)) ** 2, axis=0) for trace in self._rows.traces
+            np.sum((trace.sample(applied) - trace.sample(others)) ** 2, axis=0) for trace in self._rows.traces
         )
         return frozenset(np.flatnonzero(power > _MOVED * np.max(power)).tolist())
 
     def _power_share(self, other: Evidence, number: int) -> float:
         """Return a family's share of the power that it and an accepted effect have in the signal."""
-        applied, rest = self._found.applied, self._found.without(number)
+        applied, others = self._found.applied, self._found.without(number)
         component = other.place.component
         columns = slice(None) if component is None else [component]
-        own = sum(
-            float(np.sum((trace.sample(applied) - trace.sample(rest))[:, columns] ** 2))
+        of_cause = sum(
+            float(np.sum((trace.sample(applied) - trace.sample(others))[:, columns] ** 2))
             for trace in self._rows.traces
         )
         power = sum(float(np.sum(signal**2)) for signal in other.signal)
-        return power / max(power + own, 1e-300)
+        return power / max(power + of_cause, 1e-300)
 
     def _cost(self, out: View, number: int) -> float:
         """Return what the numbers of an effect cost as chi2, as in `Fitted.occam`."""

@@ -113,8 +113,8 @@ class Size:
     @property
     def shrink(self) -> float:
         """Return the share of the explainable gap that is gone, 0 to 1 (docs/diagnose.md)."""
-        gap, left = self.before - self.floor, self.after - self.floor
-        return float(np.clip(1.0 - left / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
+        gap, gap_after = self.before - self.floor, self.after - self.floor
+        return float(np.clip(1.0 - gap_after / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
 
 def pooled(sizes: Sequence[Size]) -> Size:
@@ -150,12 +150,12 @@ def size_of_gap(
     usual: Sequence[Applied] = (),
 ) -> Size:
     """Return the size of the gap of some traces with and without effects; ``usual`` are normal mismatch."""
-    left = [trace.measured - trace.sample([*usual, *applied]) for trace in traces]
+    residuals = [trace.measured - trace.sample([*usual, *applied]) for trace in traces]
     gap = [trace.measured - trace.sample(usual) for trace in traces]
     likelihood = Likelihood(traces, nuisance, noise)
-    own, shared = fitted_mismatch(likelihood, left)
+    by_run, shared = fitted_mismatch(likelihood, residuals)
     # clocks, frames and zeros within normal mismatch are taken out of the data, before and after alike
-    after, before = _less(left, own), _less(gap, own)
+    after, before = _less(residuals, by_run), _less(gap, by_run)
     sigma2 = sum(each.sigma**2 for each in noise)
     structured = _less(after, shared)
     deviation, freedom = _deviation(traces, [_squares(each) for each in structured], noise)
@@ -177,7 +177,7 @@ def size_of_gap(
     )
 
 
-def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequence[Applied]) -> int:
+def moments_off(traces: Sequence[Trace], residuals: Sequence[Floats], applied: Sequence[Applied]) -> int:
     """Return in how many rows a rest (n, k) is beyond the accuracy of a model; 0 where noise is the limit.
 
     A mean over the run does not see what is off at its corners alone.
@@ -185,13 +185,13 @@ def moments_off(traces: Sequence[Trace], left: Sequence[Floats], applied: Sequen
     if traces[0].link.model_rms == 0.0:
         return 0
     beyond = (
-        np.abs(rest) > _LIMITS.model_off * trace.model_error(applied)
-        for trace, rest in zip(traces, left, strict=True)
+        np.abs(residual) > _LIMITS.model_off * trace.model_error(applied)
+        for trace, residual in zip(traces, residuals, strict=True)
     )
     return sum(int(np.count_nonzero(rows.any(axis=1))) for rows in beyond)
 
 
-def _rough_joint(likelihood: Likelihood, left: Sequence[Floats]) -> float:
+def _rough_joint(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     """Return by how much more power over its noise's one joint has than most, in two runs; 0 where little.
 
     Six encoders are alike: what is loud in few of them, for moments too, is no noise.
@@ -200,8 +200,8 @@ def _rough_joint(likelihood: Likelihood, left: Sequence[Floats]) -> float:
         return 0.0
     power = np.array(
         [
-            [float(np.mean(likelihood.white(number, j, rest[:, [j]]) ** 2)) for j in range(len(JOINTS))]
-            for number, rest in enumerate(left)
+            [float(np.mean(likelihood.white(number, j, residual[:, [j]]) ** 2)) for j in range(len(JOINTS))]
+            for number, residual in enumerate(residuals)
         ]
     )
     beyond = np.sort(power - np.median(power, axis=1, keepdims=True), axis=0)
@@ -209,7 +209,7 @@ def _rough_joint(likelihood: Likelihood, left: Sequence[Floats]) -> float:
     return share if share > _LIMITS.rough_joint else 0.0
 
 
-def _loud_in_step(likelihood: Likelihood, left: Sequence[Floats]) -> float:
+def _loud_in_step(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     """Return the largest power of a component's loud moments in step with the command over its noise's."""
     traces, noise = likelihood.traces, likelihood.noise
     if traces[0].link.model_rms or traces[0].still:
@@ -220,8 +220,8 @@ def _loud_in_step(likelihood: Likelihood, left: Sequence[Floats]) -> float:
     shares = [0.0]
     for j in range(len(noise)):
         rows = [
-            _by_moments(likelihood.white(number, j, rest[:, [j]])[:, 0], traces[number])
-            for number, rest in enumerate(left)
+            _by_moments(likelihood.white(number, j, residual[:, [j]])[:, 0], traces[number])
+            for number, residual in enumerate(residuals)
         ]
         power = np.mean(np.concatenate(rows) ** 2, axis=1)
         shares.append(_share_in_step(power, is_changing, len(noise), _EVENT_S / moment_s))
@@ -273,9 +273,9 @@ def _mean_square(values: Sequence[Floats]) -> float:
 def _calm_mean_square(traces: Sequence[Trace], values: Sequence[Floats], noise: Sequence[Noise]) -> float:
     """Return the mean square of values (n, k), of each component over its calm rows."""
     power = 0.0
-    for j, own in enumerate(noise):
+    for j, model in enumerate(noise):
         columns = [each[:, j] for each in values]
-        calm = [own.calm_rows(x, trace.segments) for x, trace in zip(columns, traces, strict=True)]
+        calm = [model.calm_rows(x, trace.segments) for x, trace in zip(columns, traces, strict=True)]
         power += float(np.mean(np.concatenate([x[rows] for x, rows in zip(columns, calm, strict=True)]) ** 2))
     return power
 
@@ -292,14 +292,14 @@ def fitted_mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> tupl
     design = likelihood.design
     b = likelihood.nuisance_of(likelihood.whiten(residuals))
     is_shared = np.arange(design.width) < design.shared
-    own, shared = (
+    by_run, shared = (
         [
             design.effect(number, trace, np.where(chosen, b, 0.0))
             for number, trace in enumerate(likelihood.traces)
         ]
         for chosen in (~is_shared, is_shared)
     )
-    return own, shared
+    return by_run, shared
 
 
 def _deviation(
@@ -625,9 +625,9 @@ class Examination:
 
     def rows_changed(self, number: int) -> Bools:
         """Return which of the data (v,) an accepted effect changes at all."""
-        rest = self.without(number)
+        others = self.without(number)
         change: Floats = self.likelihood.whiten(
-            [trace.sample(self.applied) - trace.sample(rest) for trace in self.traces]
+            [trace.sample(self.applied) - trace.sample(others) for trace in self.traces]
         )
         changed: Bools = np.abs(change) > _ACTS * np.abs(change).max(initial=0.0)
         return changed
@@ -661,8 +661,8 @@ def _renamed(b: Floats, names: Sequence[str], wanted: Sequence[str]) -> Floats:
     of_name: dict[str, list[float]] = {}
     for name, value in zip(names, b.tolist(), strict=True):
         of_name.setdefault(name, []).append(value)
-    left = {name: iter(values) for name, values in of_name.items()}
-    return np.array([next(left.get(name, iter(())), 0.0) for name in wanted])
+    remaining = {name: iter(values) for name, values in of_name.items()}
+    return np.array([next(remaining.get(name, iter(())), 0.0) for name in wanted])
 
 
 def at_stamps(trace: Trace, stamps_s: Floats) -> Trace:
@@ -671,26 +671,26 @@ def at_stamps(trace: Trace, stamps_s: Floats) -> Trace:
     return replace(trace, time_s=stamps_s, measured=nothing, segments=np.array([[0, len(stamps_s)]]))
 
 
-def observable(found: Examination) -> list[dict[str, Any]]:
+def observable(examination: Examination) -> list[dict[str, Any]]:
     """Return for each effect with one size the smallest that would have been reported in this link.
 
     From the first order of its signature; nothing of a path that is sound. ``seen`` is false where mismatch
     could do nearly all that it does.
     """
     smallest: dict[Key, dict[str, Any]] = {}
-    needed = max(2.0 * found.first_level, _LIMITS.least_ratio**2 * found.data.times)
-    candidates = found.data.candidates
-    for column, (share, power) in zip(candidates.columns, found.observable, strict=False):
+    needed = max(2.0 * examination.first_level, _LIMITS.least_ratio**2 * examination.data.times)
+    candidates = examination.data.candidates
+    for column, (share, power) in zip(candidates.columns, examination.observable, strict=False):
         block = candidates.block(column)
         name = _only_size(block)
         if column.width != 1 or name is None or power <= 0.0:
             continue
         entry = {
-            "link": found.link.name,
+            "link": examination.link.name,
             "effect": block.effect.name,
             "target": block.target,
             "parameter": name,
-            "smallest": _typical(found, block, name) * float(np.sqrt(needed / power)),
+            "smallest": _typical(examination, block, name) * float(np.sqrt(needed / power)),
             "seen": share >= _LIMITS.observable_share,
         }
         if block.key not in smallest or entry["smallest"] < smallest[block.key]["smallest"]:
@@ -704,8 +704,8 @@ def _only_size(block: Block) -> str | None:
     return sizes[0] if len(sizes) == 1 else None
 
 
-def _typical(found: Examination, block: Block, name: str) -> float:
+def _typical(examination: Examination, block: Block, name: str) -> float:
     """Return by how much a typical effect is away from nominal."""
-    inputs = found.traces[0].inputs
+    inputs = examination.traces[0].inputs
     start, nominal = (f(inputs, block.target)[name] for f in (block.effect.start, block.effect.nominal))
     return abs(start - nominal)

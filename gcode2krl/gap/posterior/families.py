@@ -78,17 +78,17 @@ class Rows:
         """
         used = range(len(self.likelihood.noise)) if component is None else (component,)
         blocks = [
-            self._blocks(number, j, own)
-            for number, each in enumerate(columns)
-            for j, own in zip(used, each, strict=True)
+            self._blocks(number, j, values)
+            for number, of_trace in enumerate(columns)
+            for j, values in zip(used, of_trace, strict=True)
         ]
         return np.concatenate(blocks)
 
     def _nuisance(self) -> SplitColumns:
         columns = [
             UsedColumns(self._in_blocks(number, used.values), used.at)
-            for number, own in enumerate(self.likelihood.whitened_nuisance)
-            for used in own
+            for number, of_trace in enumerate(self.likelihood.whitened_nuisance)
+            for used in of_trace
         ]
         return SplitColumns.of_parts(columns, self.likelihood.design.width)
 
@@ -116,9 +116,9 @@ class Rows:
         """Return the number (v,) of each block's first value."""
         ends = np.cumsum([trace.measured.size for trace in self.traces])[:-1]
         parts = []
-        for trace, starts, own in zip(self.traces, self.starts, np.split(numbers, ends), strict=True):
+        for trace, starts, of_trace in zip(self.traces, self.starts, np.split(numbers, ends), strict=True):
             n, k = trace.shape
-            parts.append(own.reshape(k, n)[:, starts].ravel())
+            parts.append(of_trace.reshape(k, n)[:, starts].ravel())
         return np.concatenate(parts)
 
 
@@ -164,8 +164,8 @@ class View:
     @classmethod
     def of(cls, rows: Rows, residuals: Sequence[Floats], tangents: Sequence[Floats]) -> "View":
         """Return the view of residuals (n, k) with tangents (k, n, t) of the effects in the model."""
-        left = rows.of([each.T[:, :, None] for each in residuals])[:, 0]
-        return cls(left, rows.of(tangents), rows.nuisance, rows.members, rows.components, rows.runs)
+        residual = rows.of([each.T[:, :, None] for each in residuals])[:, 0]
+        return cls(residual, rows.of(tangents), rows.nuisance, rows.members, rows.components, rows.runs)
 
     def beside(self, residual: Floats, tangents: Floats) -> "View":
         """Return the view of the same rows with another residual (v,) and other tangents (v, t)."""
@@ -302,10 +302,12 @@ class View:
         moved = np.empty((moves, len(self.projected)))
         begins = np.flatnonzero(np.diff(self.runs, prepend=-1) | np.diff(self.components, prepend=-1))
         for first, last in zip(begins, [*begins[1:], len(self.runs)], strict=True):
-            rest, run = self.projected[first:last], self.runs[first]
-            by = np.round(shares[:, run] * len(rest)).astype(np.int64)
+            residual, run = self.projected[first:last], self.runs[first]
+            by = np.round(shares[:, run] * len(residual)).astype(np.int64)
             # all components of a run together: what moves them at once does so then, too
-            moved[:, first:last] = signs[:, [run]] * rest[(np.arange(len(rest)) - by[:, None]) % len(rest)]
+            moved[:, first:last] = (
+                signs[:, [run]] * residual[(np.arange(len(residual)) - by[:, None]) % len(residual)]
+            )
         return moved
 
     @cached_property
@@ -335,8 +337,8 @@ class View:
         cost = self._normal[t:, t:] - right[:, 1:].T @ half[:, 1:]
         pull = self.cross[t:] - right[:, 1:].T @ half[:, 0]
         b = boxed(cost, pull)
-        left = float(self.residual @ self.residual - right[:, 0] @ half[:, 0])
-        chi2 = left - 2.0 * float(b @ pull) + float(b @ cost @ b)
+        unexplained = float(self.residual @ self.residual - right[:, 0] @ half[:, 0])
+        chi2 = unexplained - 2.0 * float(b @ pull) + float(b @ cost @ b)
         return chi2, (half[:, 0] - half[:, 1:] @ b)[t:]
 
 
@@ -463,31 +465,31 @@ def evidence_of(
     ``raw`` (k, n, c) of each trace are the same columns before they were whitened.
     ``signs`` (flips, g) of stretches; ``cost`` of the search for ``at``, in nats.
     """
-    beside = Beside(view, columns)
-    gram, score, scores = beside.gram, beside.score, beside.scores
+    projected = Beside(view, columns)
+    gram, score, scores = projected.gram, projected.score, projected.scores
     best: tuple[float, int, Floats, Floats] | None = None
     flips, owns = [], []
     for values, turned in _along_roots(gram, roots):
-        own = log_evidence(values, turned.T @ score)
+        log_evidences = log_evidence(values, turned.T @ score)
         flips.append(log_mean(log_evidence(values, signs @ (scores @ turned))))
-        owns.append(log_mean(own))
-        top = int(np.argmax(own))
-        if best is None or own[top] > best[0]:
-            best = (float(own[top]), top, values, turned)
+        owns.append(log_mean(log_evidences))
+        top = int(np.argmax(log_evidences))
+        if best is None or log_evidences[top] > best[0]:
+            best = (float(log_evidences[top]), top, values, turned)
     if best is None:
         return None
     _, top, values, turned = best
     own_weights = turned.T @ score / (values + AMPLITUDES[top] ** -2)
-    explained = beside.explained(turned @ own_weights)
-    left = beside.scores_without(explained) @ turned
-    fit = _bounded(beside, turned, values, top)
+    explained = projected.explained(turned @ own_weights)
+    scores_left = projected.scores_without(explained) @ turned
+    fit = _bounded(projected, turned, values, top)
     inverse = np.diag(1.0 / (values + fit.amplitude**-2))
     return Evidence(
         place=place,
         on=on,
         nats=fit.nats - float(np.log(len(roots))) - cost,
         gain=max(fit.gain, 0.0),
-        inflation=gain_inflation(inverse, left, fitted=0),
+        inflation=gain_inflation(inverse, scores_left, fitted=0),
         flipped=log_mean(np.array(flips).T) - cost,
         unbounded=float(log_mean(np.array(owns))) - cost,
         signal=tuple((own @ (turned @ fit.weights)).T for own in raw),
@@ -507,12 +509,13 @@ def _along_roots(gram: Floats, roots: Sequence[Floats]) -> Iterator[tuple[Floats
 
 def moved_evidence(view: View, columns: Columns, roots: Sequence[Floats]) -> Floats:
     """Return the log evidence (moves,) of columns where each run's residual is moved in time."""
-    beside = Beside(view, columns)
-    scores = beside.moved_scores
-    found = [
-        log_mean(log_evidence(values, scores @ turned)) for values, turned in _along_roots(beside.gram, roots)
+    projected = Beside(view, columns)
+    scores = projected.moved_scores
+    log_evidences = [
+        log_mean(log_evidence(values, scores @ turned))
+        for values, turned in _along_roots(projected.gram, roots)
     ]
-    return log_mean(np.array(found).T) if found else np.full(len(scores), -np.inf)
+    return log_mean(np.array(log_evidences).T) if log_evidences else np.full(len(scores), -np.inf)
 
 
 def _in_one(view: View, explained: Floats) -> float:
@@ -530,14 +533,14 @@ class _Fit(NamedTuple):
     weights: Floats
 
 
-def _bounded(beside: Beside, turned: Floats, values: Floats, top: int) -> _Fit:
+def _bounded(projected: Beside, turned: Floats, values: Floats, top: int) -> _Fit:
     """Return the fit of columns, turned by (c, c'), whose inner products then have these eigenvalues (c',).
 
     The amplitude is searched upwards from that which is best with unbounded nuisance, which explains more.
     """
-    view = beside.view
-    gram, fixed = turned.T @ beside.columns.gram @ turned, turned.T @ beside.fixed
-    score = turned.T @ beside.on_residual
+    view = projected.view
+    gram, fixed = turned.T @ projected.columns.gram @ turned, turned.T @ projected.fixed
+    score = turned.T @ projected.on_residual
     best = _Fit(-np.inf, 0.0, 1.0, np.zeros(len(values)))
     for a in AMPLITUDES[top:]:
         chi2, weights = view.bounded(a * a * gram, a * fixed, a * score)

@@ -46,11 +46,11 @@ class ArmGeometry:
     """The runs with the errors taken off their measured tips: what else is at work is left in them."""
 
 
-def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmGeometry | None:
+def geometry_of_arm(pairs: Sequence[Pair], explaining: int, share_left: float) -> ArmGeometry | None:
     """Return the geometry of the arm that explains runs of poses; None where it brings less than a fifth.
 
-    ``left``: share of the gap's rms that causes which were found already leave. None too where a frame and a
-    tool alone do as well, where they are most of the gap (effects of their own are for these), or where
+    ``share_left``: share of the gap's rms that causes which were found already leave. None too where a frame
+    and a tool alone do as well, where they are most of the gap (effects of their own are for these), or where
     the robot is not known. Numbers that few poses do not tell are held by makers' tolerances.
     """
     if not all(_can_be_fitted(pair) for pair in pairs):
@@ -69,9 +69,9 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, left: float) -> ArmG
     ]
     good: Bools = ~fit.is_outlier
     before_mm = rms(np.concatenate(raw)[good])
-    if left * before_mm > _FIT_LIMITS.poses_mostly_frames * fit.rms_before_mm:
+    if share_left * before_mm > _FIT_LIMITS.poses_mostly_frames * fit.rms_before_mm:
         return None
-    most = _FIT_LIMITS.poses_geometry_share * min(left * before_mm, fit.rms_before_mm)
+    most = _FIT_LIMITS.poses_geometry_share * min(share_left * before_mm, fit.rms_before_mm)
     if fit.rms_after_mm > most:
         return None
     corrected = tuple(
@@ -176,41 +176,41 @@ class _Finding:
     shrink: float
 
 
-def _judgement(link: SurfaceLink, found: _Finding, context: Context) -> SurfaceJudgement:
+def _judgement(link: SurfaceLink, finding: _Finding, context: Context) -> SurfaceJudgement:
     """Return the judgement; a cause that an earlier link has named is not repeated."""
-    effect = found.applied.effect
-    sure = found.is_gap and found.shrink >= _COMPARE_LIMITS.scan_least_shrink
+    effect = finding.applied.effect
+    sure = finding.is_gap and finding.shrink >= _COMPARE_LIMITS.scan_least_shrink
     named = {applied.effect.name for judged in context.judgements for applied in judged.applied}
     cause = Cause(
-        applied=found.applied,
+        applied=finding.applied,
         link=link.name,
         probability=_COMPARE_LIMITS.scan_probability if sure else _COMPARE_LIMITS.scan_probability_unsure,
-        parameters={effect.names[0]: found.interval},
-        shrink=found.shrink,
-        rms_after=found.after**0.5,
+        parameters={effect.names[0]: finding.interval},
+        shrink=finding.shrink,
+        rms_after=finding.after**0.5,
         rivals=None,
     )
     return SurfaceJudgement(
         link=link,
         verdict="explained" if sure else "no_gap",
-        causes=(cause,) if found.is_gap and effect.name not in named else (),
-        size=_size(found),
-        size_with_named=None if sure else replace(_size(found), after=found.before),
+        causes=(cause,) if finding.is_gap and effect.name not in named else (),
+        size=_size(finding),
+        size_with_named=None if sure else replace(_size(finding), after=finding.before),
         held_out=True,
         factor=1.0,
-        points=found.points,
-        held_out_shrink=found.shrink,
+        points=finding.points,
+        held_out_shrink=finding.shrink,
     )
 
 
-def _size(found: _Finding) -> Size:
+def _size(finding: _Finding) -> Size:
     """Return the size of the gap; the scatter about the fitted surface counts as noise."""
     return Size(
-        rows=found.points,
-        before=found.before,
-        after=found.after,
-        floor=found.after,
-        noise=found.after,
+        rows=finding.points,
+        before=finding.before,
+        after=finding.after,
+        floor=finding.after,
+        noise=finding.after,
         excess=0.0,
         excess_before=0.0,
         deviation=0.0,
@@ -227,14 +227,14 @@ def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) 
     good = _inliers(x, y, prior)
     x, y, block = x[good], y[good], block[good]
     b, covariance = _fit(x, y, prior, block)
-    rest = y - x @ b
+    residual = y - x @ b
     others = b.copy()
     others[0] = 0.0
     before = y - x @ others
     even = block % 2 == 0
     held = [(even, ~even), (~even, even)]
     power = [_held_out(x, y, prior, chosen, test) for chosen, test in held if chosen.any() and test.any()]
-    noise2 = float(np.mean(rest**2))
+    noise2 = float(np.mean(residual**2))
     gap2 = float(np.mean([p[0] for p in power])) - noise2 if power else 0.0
     left2 = float(np.mean([p[1] for p in power])) - noise2 if power else 0.0
     shrink = float(np.clip(1.0 - left2 / gap2, 0.0, 1.0)) if gap2 > 0.0 else 0.0
@@ -306,25 +306,25 @@ def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
 
 
 def _inliers(x: Floats, y: Floats, prior: Floats) -> Bools:
-    rest = y - x @ _solved(x, y, prior)
-    good: Bools = np.abs(rest) < _COMPARE_LIMITS.scan_outliers * 1.4826 * np.median(np.abs(rest))
+    residual = y - x @ _solved(x, y, prior)
+    good: Bools = np.abs(residual) < _COMPARE_LIMITS.scan_outliers * 1.4826 * np.median(np.abs(residual))
     return good
 
 
 def _fit(x: Floats, y: Floats, prior: Floats, block: Ints) -> tuple[Floats, Floats]:
     """Return coefficients and covariance, widened where blocks scatter more than points (White 1980)."""
     b = _solved(x, y, prior)
-    rest = y - x @ b
-    spread2 = float(np.mean(rest**2))
+    residual = y - x @ b
+    spread2 = float(np.mean(residual**2))
     inverse = np.asarray(np.linalg.inv(x.T @ x / spread2 + np.diag(prior)), dtype=np.float64)
-    return b, clustered_covariance(inverse, cluster_scores(x, rest / spread2, block))
+    return b, clustered_covariance(inverse, cluster_scores(x, residual / spread2, block))
 
 
 def _held_out(x: Floats, y: Floats, prior: Floats, chosen: Bools, test: Bools) -> tuple[float, float]:
     """Return the mean squares of held-out points without and with the radius of the others."""
     radius = x[test, 0] * _solved(x[chosen], y[chosen], prior)[0]
     # the other numbers belong to the held-out points themselves
-    own, others = _solved(x[test], y[test], prior)[1:], x[test, 1:]
-    left = y[test] - radius
-    left = left - others @ _solved(others, left, prior[1:])
-    return float(np.mean((y[test] - others @ own) ** 2)), float(np.mean(left**2))
+    mismatch, others = _solved(x[test], y[test], prior)[1:], x[test, 1:]
+    residual = y[test] - radius
+    residual = residual - others @ _solved(others, residual, prior[1:])
+    return float(np.mean((y[test] - others @ mismatch) ** 2)), float(np.mean(residual**2))

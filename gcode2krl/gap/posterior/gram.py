@@ -193,10 +193,10 @@ class SignatureGram:
         self.signatures, self.places = signatures, places
         self._columns = [
             [
-                (own, UsedColumns(used.values, signatures + np.searchsorted(at, used.at)))
-                for own, used in zip(of_trace, beside, strict=True)
+                (columns_, UsedColumns(used.values, signatures + np.searchsorted(at, used.at)))
+                for columns_, used in zip(of_trace, of_nuisance, strict=True)
             ]
-            for of_trace, beside, at in zip(columns, nuisance, places, strict=True)
+            for of_trace, of_nuisance, at in zip(columns, nuisance, places, strict=True)
         ]
         self._rows = [[np.flatnonzero(each == number) for number in np.unique(each)] for each in stretches]
         self._fixed = [
@@ -208,17 +208,17 @@ class SignatureGram:
         width = self.signatures + len(self.places[number])
         gram = np.zeros((width, width))
         for both in self._columns[number]:
-            own = np.column_stack([used.values[rows] for used in both])
+            values = np.column_stack([used.values[rows] for used in both])
             at = np.concatenate([used.at for used in both])
-            gram[np.ix_(at, at)] += own.T @ own  # of one array BLAS makes half of the products
+            gram[np.ix_(at, at)] += values.T @ values  # of one array BLAS makes half of the products
         return gram
 
     def _cross(self, number: int, rows: Ints, new: Floats) -> Floats:
         """Return inner products (1 + t, s + w) of some rows of a trace with other columns (k, n, 1 + t)."""
         cross = np.zeros((new.shape[2], self.signatures + len(self.places[number])))
-        for own, both in zip(new, self._columns[number], strict=True):
+        for component, both in zip(new, self._columns[number], strict=True):
             for used in both:
-                cross[:, used.at] += own[rows].T @ used.values[rows]
+                cross[:, used.at] += component[rows].T @ used.values[rows]
         return cross
 
     @classmethod
@@ -235,11 +235,11 @@ class SignatureGram:
         """Return the view with whitened data (k·n, 1 + t) of each trace: residual r and tangents T."""
         traces = []
         for number, (new, rows) in enumerate(zip(data, self._rows, strict=True)):
-            own = new.reshape(len(self._columns[number]), -1, new.shape[1])
+            by_component = new.reshape(len(self._columns[number]), -1, new.shape[1])
             stretches = []
             for at, fixed in zip(rows, self._fixed[number], strict=True):
-                columns = own[:, at].reshape(-1, new.shape[1])
-                stretches.append(_Joined(columns.T @ columns, self._cross(number, at, own), fixed))
+                columns = by_component[:, at].reshape(-1, new.shape[1])
+                stretches.append(_Joined(columns.T @ columns, self._cross(number, at, by_component), fixed))
             inner, cross = (np.sum([each[i] for each in stretches], axis=0) for i in range(2))
             total = np.block([[inner, cross], [cross.T, self.totals[number]]])
             traces.append(TraceGram(tuple(stretches), total, self.places[number]))
@@ -308,10 +308,10 @@ class Gram:
         """Return the Gram matrix over all traces of some columns and of all nuisance, in the order of b."""
         size = len(kept) + 1 + max(int(each.places.max(initial=-1)) for each in self.traces)
         summed = np.zeros((size, size))
-        for each in self.traces:
-            at = np.r_[kept, np.arange(self._kept, len(each.total))]
-            into = np.r_[np.arange(len(kept)), len(kept) + each.places]
-            summed[np.ix_(into, into)] += each.total[np.ix_(at, at)]
+        for trace in self.traces:
+            at = np.r_[kept, np.arange(self._kept, len(trace.total))]
+            into = np.r_[np.arange(len(kept)), len(kept) + trace.places]
+            summed[np.ix_(into, into)] += trace.total[np.ix_(at, at)]
         return summed
 
     @cached_property
@@ -382,8 +382,8 @@ class Gram:
     def observable(self, columns: Ints) -> tuple[float, float]:
         """Return the least share of signatures' power that nuisance leaves, and the least power left."""
         at = self._at(columns)
-        left, whole = np.diag(self.marginal)[at], np.diag(self.total)[at]
-        return float(np.min(left / np.maximum(whole, 1e-300))), float(np.min(left))
+        power_left, whole = np.diag(self.marginal)[at], np.diag(self.total)[at]
+        return float(np.min(power_left / np.maximum(whole, 1e-300))), float(np.min(power_left))
 
     def inflation(self, columns: Ints) -> float:
         """Return by how much the gain of signatures varies more than white noise lets it, at least 1.
@@ -394,16 +394,16 @@ class Gram:
         chosen = np.r_[0, self._at(columns)]
         given = np.arange(1, 1 + self.tangents)
         coefficients, inverse, explained = self._linear_fit(chosen, given)
-        rest = np.r_[1.0, -coefficients]
+        weights = np.r_[1.0, -coefficients]
         scores = []
-        for each in self.traces:
-            nuisance = np.arange(self._kept, len(each.total))
+        for trace in self.traces:
+            nuisance = np.arange(self._kept, len(trace.total))
             rows = np.r_[chosen, given, nuisance]
             # columns of the projected residual and signatures, in those of the Gram matrix
-            into = np.r_[np.arange(len(given)), len(given) + each.places]
+            into = np.r_[np.arange(len(given)), len(given) + trace.places]
             basis = np.vstack([np.eye(len(chosen)), -explained[into]])
-            for gram in each.stretches:
-                scores.append(basis[:, 1:].T @ gram.of(rows) @ (basis @ rest))
+            for gram in trace.stretches:
+                scores.append(basis[:, 1:].T @ gram.of(rows) @ (basis @ weights))
         return gain_inflation(inverse, np.array(scores), fitted=len(chosen))
 
     def _linear_fit(self, chosen: Ints, given: Ints) -> tuple[Floats, Floats, Floats]:
@@ -441,9 +441,9 @@ def solve(a: Floats, b: Floats) -> Floats:
 
 def marginal(gram: Floats, keep: int) -> Floats:
     """Return the Gram matrix of the first ``keep`` columns with the rest as nuisance of unit variance."""
-    rest = gram[keep:, keep:] + np.eye(len(gram) - keep)
+    fixed = gram[keep:, keep:] + np.eye(len(gram) - keep)
     cross = gram[:keep, keep:]
-    return gram[:keep, :keep] - cross @ np.linalg.solve(rest, cross.T)
+    return gram[:keep, :keep] - cross @ np.linalg.solve(fixed, cross.T)
 
 
 class Part(NamedTuple):
@@ -502,13 +502,13 @@ class SplitColumns:
             product[part.rows] += part.values @ weights[part.at]
         return product
 
-    def __rmatmul__(self, left: Floats | csr_array) -> Floats:
+    def __rmatmul__(self, factor: Floats | csr_array) -> Floats:
         """Return the product (…, t + m) of values (…, v), dense or sparse, with the columns."""
-        by_row = left if isinstance(left, np.ndarray) else left.tocsc()  # its columns are cut out
-        sums = np.zeros((*left.shape[:-1], self.width + 1))
+        by_row = factor if isinstance(factor, np.ndarray) else factor.tocsc()  # its columns are cut out
+        sums = np.zeros((*factor.shape[:-1], self.width + 1))
         for part in self.parts:
             sums[..., part.at] += by_row[..., part.rows] @ part.values
-        return np.concatenate([left @ self.whole, sums[..., :-1]], axis=-1)
+        return np.concatenate([factor @ self.whole, sums[..., :-1]], axis=-1)
 
     @cached_property
     def gram(self) -> Floats:
@@ -520,8 +520,8 @@ class SplitColumns:
         """Return inner products (m, m), over some rows (v,), of those that are not of all rows."""
         gram = np.zeros((self.width + 1, self.width + 1))
         for part in self.parts:
-            own = part.values if rows is None else part.values[rows[part.rows]]
-            gram[np.ix_(part.at, part.at)] += own.T @ own
+            values = part.values if rows is None else part.values[rows[part.rows]]
+            gram[np.ix_(part.at, part.at)] += values.T @ values
         return gram[:-1, :-1]
 
     def used(self, rows: Bools) -> Bools:
@@ -535,8 +535,8 @@ class SplitColumns:
         """Return some rows (v,), whole parts, of some columns (m,); values are shared."""
         count = int(columns.sum())
         places = np.append(np.where(columns, np.cumsum(columns) - 1, count), count)
-        own = (UsedColumns(part.values, places[part.at]) for part in self._within(rows))
-        return SplitColumns.of_parts(own, count)
+        parts = (UsedColumns(part.values, places[part.at]) for part in self._within(rows))
+        return SplitColumns.of_parts(parts, count)
 
     def _within(self, rows: Bools) -> Iterator[Part]:
         return (part for part in self.parts if len(part.values) and rows[part.first])

@@ -226,27 +226,27 @@ def _coefficient(trace: Trace, clock: Floats, others: Sequence[Floats]) -> float
     return float(coefficients[0] / scale[0])
 
 
-def is_wander(found: Examination, traces: Sequence[Trace], rest: Rest) -> bool:
+def is_wander(examination: Examination, traces: Sequence[Trace], rest: Rest) -> bool:
     """Tell whether what is left of a link without any cause (`rest`, of these traces) is such a wander.
 
     Trackers and force sensors wander; an encoder counts.
     """
     if (
-        found.link.of_joints
+        examination.link.of_joints
         or len(traces) < 2
         or not rest.study.evidences
         or not _is_own_time(rest.study.evidences)
     ):
         return False
     best = rest.study.evidences[0]
-    if not _is_small(best, found.noise):
+    if not _is_small(best, examination.noise):
         return False
     steady = [_less(trace, best, signal) for trace, signal in zip(traces, best.signal, strict=True)]
     for before, after in zip(traces, steady, strict=True):
-        found.data.known.same(before, after)  # what was measured changes no signature
-    plain = _causes_taken_out(found)
-    nuisance = nuisance_for(steady, found.question, found.data.known)
-    if size_of_gap(steady, nuisance, found.noise, (), found.mismatch).significant:
+        examination.data.known.same(before, after)  # what was measured changes no signature
+    plain = _causes_taken_out(examination)
+    nuisance = nuisance_for(steady, examination.question, examination.data.known)
+    if size_of_gap(steady, nuisance, examination.noise, (), examination.mismatch).significant:
         return False
     return not LinkFamilies(plain, steady).rest.is_gap
 
@@ -280,11 +280,11 @@ def _less(trace: Trace, evidence: Evidence, signal: Floats) -> Trace:
     return replace(trace, measured=measured)
 
 
-def _causes_taken_out(found: Examination) -> Examination:
-    while found.cause_numbers:
-        number = found.cause_numbers[-1]
-        found = found.dropping(number, refit(found.likelihood, found.without(number)))
-    return found
+def _causes_taken_out(examination: Examination) -> Examination:
+    while examination.cause_numbers:
+        number = examination.cause_numbers[-1]
+        examination = examination.dropping(number, refit(examination.likelihood, examination.without(number)))
+    return examination
 
 
 _LIMITS = THRESHOLDS.choose
@@ -297,49 +297,49 @@ _LEAST_REST = 1e-6
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     """Examine a link on some traces and report on the held-out ones; without any, each held out in turn."""
     judged = _judged(link, traces, held, question)
-    found = judged.examination
-    return replace(judged, examination=replace(found, data=found.data.settled()))
+    examination = judged.examination
+    return replace(judged, examination=replace(examination, data=examination.data.settled()))
 
 
 def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     known = Signatures()
     moved = with_set_clocks([*traces, *held], question, known)
     traces, held = moved[: len(traces)], moved[len(traces) :]
-    found, rivals, swaps = _settled(examine(link, traces, question, known))
+    examination, rivals, swaps = _settled(examine(link, traces, question, known))
     every = (*traces, *held)
-    if not found.causes:
-        return _with_impulses(_without_causes(found, every))
-    families = LinkFamilies(found, every)
-    trials = list(_trials(found, held, swaps))
-    counts = range(len(found.causes) + 1)
+    if not examination.causes:
+        return _with_impulses(_without_causes(examination, every))
+    families = LinkFamilies(examination, every)
+    trials = list(_trials(examination, held, swaps))
+    counts = range(len(examination.causes) + 1)
     if trials:
         sizes = [pooled([trial.size(count) for trial in trials]) for count in counts]
     else:
-        sizes = [_size(found, traces, found.causes[:count]) for count in counts]
-    whole = _size(found, traces, found.causes)
-    judged = _judgement(found, sizes, whole, families, trials, rivals)
+        sizes = [_size(examination, traces, examination.causes[:count]) for count in counts]
+    whole = _size(examination, traces, examination.causes)
+    judged = _judgement(examination, sizes, whole, families, trials, rivals)
     with_named = _size_with_named(judged, sizes, trials)
     judged = replace(judged, every=every, size_with_named=with_named)
     return _with_impulses(judged if judged.verdict != "explained" else _beside_its_rest(judged, whole))
 
 
-def _settled(found: Examination) -> tuple[Examination, dict[int, list[Rival]], dict[Key, Applied]]:
+def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Rival]], dict[Key, Applied]]:
     """Return the examination in which no rival of a cause is better than it, with the rivals and the swaps.
 
     The rivals of each cause by its number; what was put in place of the effects that were accepted first.
     """
     swaps: dict[Key, Applied] = {}
     while True:
-        rivals = {number: rivals_of(found, number) for number in found.cause_numbers}
+        rivals = {number: rivals_of(examination, number) for number in examination.cause_numbers}
         better = [(each[0], number) for number, each in rivals.items() if each and each[0].is_better]
-        if not better or len(swaps) >= len(found.causes):
-            return found, rivals, swaps
+        if not better or len(swaps) >= len(examination.causes):
+            return examination, rivals, swaps
         best, number = min(better, key=lambda pair: pair[0].cost_difference)
-        swapped = with_rival(found, number, best.applied)
-        if swapped is None or swapped.cost >= found.cost:
-            return found, rivals, swaps
-        swaps[found.applied[number].key] = best.applied
-        found = swapped
+        swapped = with_rival(examination, number, best.applied)
+        if swapped is None or swapped.cost >= examination.cost:
+            return examination, rivals, swaps
+        swaps[examination.applied[number].key] = best.applied
+        examination = swapped
 
 
 def _with_impulses(judged: Judgement) -> Judgement:
@@ -382,25 +382,25 @@ def _size_with_named(judged: Judgement, sizes: Sequence[Size], trials: Sequence[
     return _size(judged.examination, judged.traces, named)
 
 
-def _size(found: Examination, traces: Sequence[Trace], causes: Sequence[Applied]) -> Size:
+def _size(examination: Examination, traces: Sequence[Trace], causes: Sequence[Applied]) -> Size:
     """Return the size of the gap of some traces, with and without causes."""
-    nuisance = nuisance_for(traces, found.question, found.data.known)
-    return size_of_gap(traces, nuisance, found.noise, causes, found.mismatch)
+    nuisance = nuisance_for(traces, examination.question, examination.data.known)
+    return size_of_gap(traces, nuisance, examination.noise, causes, examination.mismatch)
 
 
-def _without_causes(found: Examination, every: tuple[Trace, ...]) -> Judgement:
-    size = _size(found, every, ())
+def _without_causes(examination: Examination, every: tuple[Trace, ...]) -> Judgement:
+    size = _size(examination, every, ())
     # families say nothing of a model that is met to its own accuracy: what it leaves is no noise
-    is_asked = size.significant or found.link.model_rms == 0.0
-    rest = LinkFamilies(found, every).rest if is_asked else NOTHING_LEFT
+    is_asked = size.significant or examination.link.model_rms == 0.0
+    rest = LinkFamilies(examination, every).rest if is_asked else NOTHING_LEFT
     rest = replace(rest, is_sized=size.significant)
-    is_gap = _is_gap(found, size, rest) and not is_wander(found, every, rest)
+    is_gap = _is_gap(examination, size, rest) and not is_wander(examination, every, rest)
     verdict = "unexplained" if is_gap else "no_gap"
-    return replace(_of(found, verdict, (), size, rest, held_out=True), every=every)
+    return replace(_of(examination, verdict, (), size, rest, held_out=True), every=every)
 
 
 def _of(
-    found: Examination,
+    examination: Examination,
     verdict: str,
     causes: tuple[Cause, ...],
     size: Size,
@@ -409,15 +409,15 @@ def _of(
     held_out: bool,
 ) -> Judgement:
     return Judgement(
-        link=found.link,
+        link=examination.link,
         verdict=verdict,
         causes=causes,
         size=size,
         held_out=held_out,
-        factor=found.traces[0].factor,
-        traces=found.traces,
-        examination=found,
-        usual=found.mismatch,
+        factor=examination.traces[0].factor,
+        traces=examination.traces,
+        examination=examination,
+        usual=examination.mismatch,
         rest=rest,
     )
 
@@ -446,30 +446,35 @@ class _Trial:
         return _size(self.chosen, self.held, causes)
 
 
-def _trials(found: Examination, held: Sequence[Trace], swaps: Mapping[Key, Applied]) -> Iterator[_Trial]:
+def _trials(
+    examination: Examination, held: Sequence[Trace], swaps: Mapping[Key, Applied]
+) -> Iterator[_Trial]:
     """Yield one trial a split: what was chosen without the held-out data, and these.
 
     ``swaps``: better rivals of what is accepted first, which take their place in each split too.
     """
     if held:
-        yield _Trial(found, held, found)
+        yield _Trial(examination, held, examination)
         return
     power = [
-        np.sum((trace.sample(found.causes) - trace.nominal) ** 2, axis=1) for trace in found.traces
+        np.sum((trace.sample(examination.causes) - trace.nominal) ** 2, axis=1)
+        for trace in examination.traces
     ]  # of what the causes do in each row
-    for train, test in folds_of(found.traces, power):
-        chosen = examine(found.link, train, found.question, found.data.known, found.noise)
+    for train, test in folds_of(examination.traces, power):
+        chosen = examine(
+            examination.link, train, examination.question, examination.data.known, examination.noise
+        )
         for key, rival in swaps.items():
             number = next((i for i, each in enumerate(chosen.applied) if each.key == key), None)
             chosen = (None if number is None else with_rival(chosen, number, rival)) or chosen
-        yield _Trial(chosen, test, found)
+        yield _Trial(chosen, test, examination)
 
 
 # Causes and verdict
 
 
 def _judgement(
-    found: Examination,
+    examination: Examination,
     sizes: Sequence[Size],
     whole: Size,
     families: LinkFamilies,
@@ -482,31 +487,31 @@ def _judgement(
     """
     last = sizes[-1]
     # what is left on held-out data alone is what few runs do not settle of a cause's numbers
-    left = last.significant and whole.significant
-    every = replace(families.rest, is_sized=left)
-    told = list(_causes(found, sizes, families, every, trials, rivals))
-    if found.question.behind_unknown or _leave_much(found, told, sizes, trials):
-        told = [_unnamed(cause) for cause in told]
-    causes = sorted(told, key=lambda cause: -cause.probability)
-    named = [found.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
-    is_sized = left if named else sizes[0].significant
+    is_significant = last.significant and whole.significant
+    every = replace(families.rest, is_sized=is_significant)
+    all_causes = list(_causes(examination, sizes, families, every, trials, rivals))
+    if examination.question.behind_unknown or _leave_much(examination, all_causes, sizes, trials):
+        all_causes = [_unnamed(cause) for cause in all_causes]
+    causes = sorted(all_causes, key=lambda cause: -cause.probability)
+    named = [examination.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
+    is_sized = is_significant if named else sizes[0].significant
     rest = replace(families.beside(named), is_sized=is_sized)
-    is_left = left and last.share_left >= THRESHOLDS.families.other_share
-    is_gap = _is_gap(found, sizes[0], rest)
+    is_left = is_significant and last.share_left >= THRESHOLDS.families.other_share
+    is_gap = _is_gap(examination, sizes[0], rest)
     if not named and is_gap:
-        is_gap = not is_wander(found, families.traces, rest)
+        is_gap = not is_wander(examination, families.traces, rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
-    return _of(found, verdict, tuple(causes), last, rest, held_out=bool(trials))
+    return _of(examination, verdict, tuple(causes), last, rest, held_out=bool(trials))
 
 
 def _leave_much(
-    found: Examination, told: Sequence[Cause], sizes: Sequence[Size], trials: Sequence["_Trial"]
+    examination: Examination, causes: Sequence[Cause], sizes: Sequence[Size], trials: Sequence["_Trial"]
 ) -> bool:
     """Tell whether the named causes leave a large share of the gap on data not used: then they are not it."""
-    named = [cause.applied for cause in told if cause.probability >= NAMED]
-    if not named or not trials or found.link.model_rms:
+    named = [cause.applied for cause in causes if cause.probability >= NAMED]
+    if not named or not trials or examination.link.model_rms:
         return False
-    size = sizes[-1] if len(named) == len(told) else pooled([trial.size_with(named) for trial in trials])
+    size = sizes[-1] if len(named) == len(causes) else pooled([trial.size_with(named) for trial in trials])
     return size.share_left > _LIMITS.named_left and size.excess > _SURE_DEVIATIONS * size.deviation
 
 
@@ -517,22 +522,22 @@ def _unnamed(cause: Cause) -> Cause:
     return replace(cause, probability=min(cause.probability, MOST_UNNAMED))
 
 
-def _is_gap(found: Examination, size: Size, rest: Rest) -> bool:
+def _is_gap(examination: Examination, size: Size, rest: Rest) -> bool:
     """Tell whether there is a gap: by its size, or by what it depends on.
 
     A model that is met to its own accuracy leaves what no noise explains, and is met all the same.
     """
-    return size.significant or (rest.is_gap and found.link.model_rms == 0.0)
+    return size.significant or (rest.is_gap and examination.link.model_rms == 0.0)
 
 
-def _verdict(named: bool, rest: bool, gap: bool) -> str:
+def _verdict(named: bool, is_left: bool, gap: bool) -> str:
     if named:
-        return "partly_explained" if rest else "explained"
+        return "partly_explained" if is_left else "explained"
     return "unexplained" if gap else "no_gap"
 
 
 def _causes(
-    found: Examination,
+    examination: Examination,
     sizes: Sequence[Size],
     families: LinkFamilies,
     every: Rest,
@@ -540,11 +545,11 @@ def _causes(
     compared: Mapping[int, Sequence[Rival]],
 ) -> Iterator[Cause]:
     """Yield the causes in the order in which they were accepted; ``every`` is what all of them leave."""
-    intervals = intervals_of(found)
-    for order, number in enumerate(found.cause_numbers):
-        tests, constant, rivals = families.tests[order], constancy_of(found, number), compared[number]
+    intervals = intervals_of(examination)
+    for order, number in enumerate(examination.cause_numbers):
+        tests, constant, rivals = families.tests[order], constancy_of(examination, number), compared[number]
         features = features_of(
-            found,
+            examination,
             number,
             tests=tests,
             rest=every,
@@ -552,13 +557,13 @@ def _causes(
             constant=constant,
             parameters=intervals[number],
             rivals=rivals,
-            held_out=_held_out(found, order, sizes, every, trials),
+            held_out=_held_out(examination, order, sizes, every, trials),
         )
         table = probabilities_table()
         probability = table.name(features)
         yield Cause(
-            applied=found.applied[number],
-            link=found.link.name,
+            applied=examination.applied[number],
+            link=examination.link.name,
             probability=probability,
             parameters=intervals[number],
             shrink=max(0.0, sizes[order + 1].shrink - sizes[order].shrink) if trials else None,
@@ -573,35 +578,35 @@ def _causes(
 
 
 def _held_out(
-    found: Examination, order: int, sizes: Sequence[Size], every: Rest, trials: Sequence[_Trial]
+    examination: Examination, order: int, sizes: Sequence[Size], every: Rest, trials: Sequence[_Trial]
 ) -> HeldOut:
     """Return what held-out data say of a cause, by its place in the order of acceptance."""
-    number = found.cause_numbers[order]
+    number = examination.cause_numbers[order]
     share_left = sizes[-1].share_left if every.is_sized else 0.0
     if not trials:
         return HeldOut(None, None, None, None, share_left)
     before, after = sizes[order].shrink, sizes[order + 1].shrink
     gone = max(0.0, after - before)
-    applied = found.applied[number]
-    folds = [trial for trial in trials if trial.chosen is not found]
+    applied = examination.applied[number]
+    folds = [trial for trial in trials if trial.chosen is not examination]
     agreeing = sum(applied.key in trial.chosen.accepted_keys for trial in folds)
     return HeldOut(
         agreeing / len(folds) if folds else None,
         gone / max(1.0 - before, _LEAST_REST),
-        gone if _acts_where_others_do(found, number) else 1.0,
+        gone if _acts_where_others_do(examination, number) else 1.0,
         sizes[-1].shrink,
         share_left,
     )
 
 
-def _acts_where_others_do(found: Examination, number: int) -> bool:
+def _acts_where_others_do(examination: Examination, number: int) -> bool:
     """Tell whether a cause acts where those before it do: in the same joints, say.
 
     Only there can it be what is left of their form. False of the first one.
     """
-    before = [other for other in found.cause_numbers if other < number]
-    rows = found.rows_changed(number)
+    before = [other for other in examination.cause_numbers if other < number]
+    rows = examination.rows_changed(number)
     if not before or not rows.any():
         return False
-    others = np.any([found.rows_changed(other) for other in before], axis=0)
+    others = np.any([examination.rows_changed(other) for other in before], axis=0)
     return float(np.mean(others[rows])) > _LIMITS.together_share

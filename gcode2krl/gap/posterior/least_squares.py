@@ -441,7 +441,7 @@ class Fitted:
         """
         grown = np.eye(len(self.information)) + _LIMITS.prior_sizes**2 * self.information
         slips = sum(
-            _slip_cost(free, each) for free, each in zip(self.numbers.free, self.applied, strict=True)
+            _slip_cost(free, applied) for free, applied in zip(self.numbers.free, self.applied, strict=True)
         )
         return float(np.linalg.slogdet(grown)[1]) + _LIMITS.number_cost * len(grown) + slips
 

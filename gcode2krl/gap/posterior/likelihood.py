@@ -88,11 +88,11 @@ class CountedOnce:
         """
         gone = np.zeros(self.design.width, dtype=np.bool_)
         together: list[Floats] = []
-        for each in applied if self._possible else ():
-            if each.effect.is_clock or not clocks:
-                gone |= self.gone(each)
-            if not clocks and _key(each) in self.together:
-                together.append(self.together[_key(each)])
+        for effect in applied if self._possible else ():
+            if effect.effect.is_clock or not clocks:
+                gone |= self.gone(effect)
+            if not clocks and _key(effect) in self.together:
+                together.append(self.together[_key(effect)])
         if not gone.any() and not together:
             return None
         return _beside(self._projection(gone), together)
@@ -126,11 +126,11 @@ class CountedOnce:
 
     def _where(self, asked: "Callable[[Nuisance], bool]") -> Bools:
         """Return which coefficients (m,) are of nuisance of which something is true."""
-        found = np.zeros(self.design.width, dtype=np.bool_)
+        where = np.zeros(self.design.width, dtype=np.bool_)
         for items, places in zip(self.design.nuisance, self.design.places, strict=True):
             widths = [each.columns.shape[2] for each in items]
-            found[places] |= np.repeat([asked(each) for each in items], widths).astype(np.bool_)
-        return found
+            where[places] |= np.repeat([asked(each) for each in items], widths).astype(np.bool_)
+        return where
 
     def _projection(self, gone: Bools) -> Floats:
         """Return the projection (m, m): shared coefficients away, others less their mean over the runs."""
@@ -147,10 +147,10 @@ def _key(applied: Applied) -> Key:
 
 def _beside(projection: Floats, together: list[Floats]) -> Floats:
     """Return a projection (m, m) less what it leaves of some directions (m, d)."""
-    left = [projection @ directions for directions in together]
-    if not left:
+    remaining = [projection @ directions for directions in together]
+    if not remaining:
         return projection
-    basis, sizes, _ = np.linalg.svd(np.concatenate(left, axis=1), full_matrices=False)
+    basis, sizes, _ = np.linalg.svd(np.concatenate(remaining, axis=1), full_matrices=False)
     basis = basis[:, sizes > _LEFT]
     less: Floats = projection - basis @ basis.T
     return less
@@ -211,11 +211,11 @@ def _imitating(
         return np.zeros((design.width, 0)), 0.0
     made = solve(inner, cross[:, at])
     shares, vectors = linalg.eigh(cross[:, at].T @ made, gram[np.ix_(at, at)] + np.eye(len(at)))
-    found = vectors[:, shares >= THRESHOLDS.fit.same_form]
-    directions = np.zeros((design.width, found.shape[1]))
-    directions[at] = np.linalg.qr(found)[0]
-    within = MOST / np.maximum(np.abs(found).max(axis=0, initial=0.0), 1e-300)
-    return directions, float(np.abs(made[0] @ found * within).sum())
+    imitating = vectors[:, shares >= THRESHOLDS.fit.same_form]
+    directions = np.zeros((design.width, imitating.shape[1]))
+    directions[at] = np.linalg.qr(imitating)[0]
+    within = MOST / np.maximum(np.abs(imitating).max(axis=0, initial=0.0), 1e-300)
+    return directions, float(np.abs(made[0] @ imitating * within).sum())
 
 
 STEP_SHARE = 0.02
@@ -238,8 +238,8 @@ class Likelihood:
         """(k, n) of each trace"""
         self.whitened_nuisance = [
             [
-                self._used(number, j, own, self.design.places[number])
-                for j, own in enumerate(self.design.columns(number, trace))
+                self._used(number, j, columns, self.design.places[number])
+                for j, columns in enumerate(self.design.columns(number, trace))
             ]
             for number, trace in enumerate(self.traces)
         ]
@@ -292,8 +292,8 @@ class Likelihood:
     def _projections(self, whitened: Floats) -> Floats:
         """Return Nᵀ·y (m, …) of whitened vectors (v, …)."""
         sums = np.zeros((self.design.width, *whitened.shape[1:]))
-        for own, columns in zip(self._split(whitened), self.whitened_nuisance, strict=True):
-            for values, used in zip(np.split(own, len(columns)), columns, strict=True):
+        for of_trace, columns in zip(self._split(whitened), self.whitened_nuisance, strict=True):
+            for values, used in zip(np.split(of_trace, len(columns)), columns, strict=True):
                 sums[used.at] += used.values.T @ values
         return sums
 
@@ -354,8 +354,8 @@ class Likelihood:
 
     def residual(self, applied: Sequence[Applied]) -> Floats:
         """Return the marginal residual (v + m,) with some effects."""
-        rest = self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
-        return self.marginal(rest, applied)
+        whitened = self.whiten([trace.measured - trace.sample(applied) for trace in self.traces])
+        return self.marginal(whitened, applied)
 
     def chi2(self, applied: Sequence[Applied]) -> float:
         """Return chi2 with some effects, by inner products: N is as large as all the data."""
@@ -401,8 +401,8 @@ class Likelihood:
         """Return the fast view of signatures (k, n, s) of each trace."""
         width = signatures[0].shape[2]
         columns = [
-            [self._used(number, j, values, np.arange(width)) for j, values in enumerate(own)]
-            for number, own in enumerate(signatures)
+            [self._used(number, j, values, np.arange(width)) for j, values in enumerate(signature)]
+            for number, signature in enumerate(signatures)
         ]
         stretches = [stretches_of(trace) for trace in self.traces]
         return SignatureGram(columns, self.whitened_nuisance, width, self.design.places, stretches)
@@ -551,17 +551,17 @@ class Sensitivity:
     def _held_out_gain(self, before: Floats, held: Bools) -> float:
         """Return the fall of chi2 on held rows, with the numbers fitted to the others."""
         step = np.linalg.lstsq(self.jacobian[~held], -self.residual[~held], rcond=_RANK)[0]
-        left = self.residual[held] + self.jacobian[held] @ step
-        return float(before[held] @ before[held] - left @ left)
+        residual = self.residual[held] + self.jacobian[held] @ step
+        return float(before[held] @ before[held] - residual @ residual)
 
 
 def sensitivity_of(likelihood: Likelihood, fitted: Fitted, effect: int) -> Sensitivity:
     """Return the sensitivity to one effect of a fit."""
     residual = likelihood.residual(fitted.applied)
     jacobian = likelihood.jacobian(fitted.numbers, fitted.x)
-    own = jacobian[:, fitted.numbers.slices[effect]]
+    of_effect = jacobian[:, fitted.numbers.slices[effect]]
     others = jacobian[:, fitted.numbers.without(effect)]
     if others.shape[1]:
-        own = own - others @ np.linalg.lstsq(others, own, rcond=_RANK)[0]
+        of_effect = of_effect - others @ np.linalg.lstsq(others, of_effect, rcond=_RANK)[0]
     rows = len(likelihood.clusters)
-    return Sensitivity(residual[:rows], own[:rows], own.T @ own, likelihood.clusters)
+    return Sensitivity(residual[:rows], of_effect[:rows], of_effect.T @ of_effect, likelihood.clusters)

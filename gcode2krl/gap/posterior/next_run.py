@@ -39,7 +39,7 @@ from gcode2krl.gap.compare.pair import Simulator
 from gcode2krl.gap.compare.trace import Context, Trace
 from gcode2krl.gap.components import Grid, Place, Signatures
 from gcode2krl.gap.noise.nuisance import nuisance_of
-from gcode2krl.gap.noise.short import Noise, white
+from gcode2krl.gap.noise.short import white
 from gcode2krl.gap.noise.source import are_repeats
 from gcode2krl.gap.posterior.examination import Examination
 from gcode2krl.gap.posterior.families import AMPLITUDES, Evidence
@@ -132,15 +132,15 @@ def foretold_of(
                 best = nats, Foretold((turned @ weights).T, turned, information)
     if best is None:
         return None
-    found = best[1].judged()
-    return found if component is None else _in_all(found, component, trial.shape[1])
+    judged = best[1].judged()
+    return judged if component is None else _in_all(judged, component, trial.shape[1])
 
 
-def _in_all(own: Foretold, component: int, k: int) -> Foretold:
+def _in_all(foretold: Foretold, component: int, k: int) -> Foretold:
     """Return what is of one component alone as one of all k."""
-    mean, columns = np.zeros((len(own.mean), k)), np.zeros((k, *own.columns.shape[1:]))
-    mean[:, component], columns[component] = own.mean[:, 0], own.columns[0]
-    return replace(own, mean=mean, columns=columns)
+    mean, columns = np.zeros((len(foretold.mean), k)), np.zeros((k, *foretold.columns.shape[1:]))
+    mean[:, component], columns[component] = foretold.mean[:, 0], foretold.columns[0]
+    return replace(foretold, mean=mean, columns=columns)
 
 
 def _every(trace: Trace) -> Ints:
@@ -186,8 +186,8 @@ def _functions(
 def _lifted(place: Place, functions: Sequence[Floats]) -> list[Floats]:
     """Return functions (n, f) of each trace at a place, (k, n, f·d)."""
     return [
-        (own[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
-        for own, unit in zip(functions, place.units, strict=True)
+        (columns[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
+        for columns, unit in zip(functions, place.units, strict=True)
     ]
 
 
@@ -239,10 +239,12 @@ class Apart:
 class Bench:
     """A program that a link would be measured in: signals of answers, and distances between them."""
 
-    def __init__(self, found: Examination, inputs: Inputs, mismatch: Mismatch) -> None:
-        self.found = found
-        self.trace = _trace_of(found.traces[0], inputs)
-        noise = [_with_model(each, self.trace.link.model_rms) for each in found.noise]
+    def __init__(self, examination: Examination, inputs: Inputs, mismatch: Mismatch) -> None:
+        self.found = examination
+        self.trace = _trace_of(examination.traces[0], inputs)
+        # the model's error comes to the instrument's noise
+        off = self.trace.link.model_rms
+        noise = [white(float(np.hypot(model.sigma, off))) for model in examination.noise]
         nuisance = nuisance_of(self.trace, {}, mismatch, Signatures(), frozenset())
         self.likelihood = Likelihood([self.trace], [nuisance], noise)
         self._noise = noise
@@ -278,9 +280,9 @@ class Bench:
     def between(self, first: Foretold, second: Foretold) -> Apart:
         """Return what sets two answers apart, the second one moved towards the first as far as it may be."""
         missing = first.mean - second.mean
-        left = missing - self._moved(missing, second)
-        rest = self.likelihood.marginal(self.likelihood.whiten([left]))
-        return self._farthest(float(rest @ rest), first, second)
+        unfitted = missing - self._moved(missing, second)
+        whitened = self.likelihood.marginal(self.likelihood.whiten([unfitted]))
+        return self._farthest(float(whitened @ whitened), first, second)
 
     def _moved(self, missing: Floats, second: Foretold) -> Floats:
         """Return by how much the second answer moves towards what is missing (n, k), to first order."""
@@ -349,15 +351,15 @@ _FREE = 1e-9
 """Keeps a normal matrix regular where a number does nothing."""
 
 
-def information_of(found: Examination, number: int | None, second: Applied) -> Floats | None:
+def information_of(examination: Examination, number: int | None, second: Applied) -> Floats | None:
     """Return what the measured runs say of an answer's numbers (p, p), in typical sizes.
 
     ``number``: the accepted effect in whose place it stands. Over the temperature of probabilities, as
     neither noise nor effects are exactly as modelled. None where it cannot be simulated there.
     """
-    others = found.applied if number is None else found.without(number)
-    likelihood = found.likelihood
-    numbers = Numbers.of((second,), found.traces[0])
+    others = examination.applied if number is None else examination.without(number)
+    likelihood = examination.likelihood
+    numbers = Numbers.of((second,), examination.traces[0])
     x = numbers.start((second,))
     if not len(x):
         return None
@@ -390,11 +392,6 @@ def _trace_of(like: Trace, inputs: Inputs) -> Trace:
         segments=np.array([[0, count]]),
         plus_late_s=0.0,
     )
-
-
-def _with_model(noise: Noise, model_rms: float) -> Noise:
-    """Return white noise as large as an instrument's and the model's error together."""
-    return white(float(np.hypot(noise.sigma, model_rms)))
 
 
 _TINY = 1e-30
@@ -513,15 +510,15 @@ def _bare(judgements: Sequence[Judgement], run: Inputs) -> Choice | None:
     whether the gap comes back. Then it is a run in air, with motion and at rest. What happens in a moment is
     told as an event; no program makes it happen again.
     """
-    left = [
+    unnamed = [
         judgement
         for judgement in judgements
         if judgement.verdict in ("unexplained", "partly_explained")
         and not (_is_event(judgement) and has_repeats(judgement))
     ]
-    if not left:
+    if not unnamed:
         return None
-    judgement = max(left, key=lambda each: each.size.power)
+    judgement = max(unnamed, key=lambda each: each.size.power)
     size = judgement.size
     excess = max(size.after - size.floor, 0.0) / max(size.floor, _TINY)
     log_odds = min(0.5 * _LIMITS.trial_rows * excess, _LIMITS.most_log_odds)
@@ -592,22 +589,22 @@ def open_pairs(judgements: Sequence[Judgement], families: Sequence[Family] = ())
 
 def _pairs_of(cause: Cause, judgement: Judgement, families: Sequence[Answer]) -> Iterator[OpenPair]:
     """Yield the pairs of a cause: with each rival, with what the rest depends on, with the unknown."""
-    found = judgement.examination
-    number = next((n for n in found.cause_numbers if found.applied[n] == cause.applied), None)
-    own = Answer(cause.applied.label, cause.probability, cause.applied)
+    examination = judgement.examination
+    number = next((n for n in examination.cause_numbers if examination.applied[n] == cause.applied), None)
+    answer = Answer(cause.applied.label, cause.probability, cause.applied)
     compared = cause.rivals or ()
     for rival, probability in compared:
         if rival.alike or (probability >= _LIMITS.least_open and cause.probability < _LIMITS.settled):
             other = Answer(rival.applied.label, probability, rival.applied)
             weight = cause.probability * (1.0 if rival.alike else probability)
-            yield OpenPair(own, other, weight, found, number)
+            yield OpenPair(answer, other, weight, examination, number)
     for family in families:
-        yield OpenPair(own, family, family.probability, found, number, judgement.every)
+        yield OpenPair(answer, family, family.probability, examination, number, judgement.every)
     apart = sum(probability for rival, probability in compared if not rival.alike)
     unknown = max(0.0, 1.0 - cause.probability - apart)
     if cause.probability < _LIMITS.settled and unknown >= _LIMITS.least_open:
         none = Answer("something else", unknown)
-        yield OpenPair(own, none, cause.probability * unknown, found, number)
+        yield OpenPair(answer, none, cause.probability * unknown, examination, number)
 
 
 def _between(families: Sequence[Answer], judgement: Judgement) -> Iterator[OpenPair]:
@@ -615,18 +612,18 @@ def _between(families: Sequence[Answer], judgement: Judgement) -> Iterator[OpenP
 
     Families of two joints are no rivals: both may be right. One that stands alone has to foretell a program.
     """
-    found, every = judgement.examination, judgement.every
+    examination, every = judgement.examination, judgement.every
     signals: dict[int | None, list[Answer]] = {}
     for family in families:
         component = None if family.evidence is None else family.evidence.place.component
         signals.setdefault(component, []).append(family)
     for answers in signals.values():
         for first, second in itertools.combinations(answers, 2):
-            yield OpenPair(first, second, first.probability * second.probability, found, None, every)
+            yield OpenPair(first, second, first.probability * second.probability, examination, None, every)
         if len(answers) == 1:
             none = Answer("something else", 1.0 - answers[0].probability)
             weight = answers[0].probability * none.probability
-            yield OpenPair(answers[0], none, weight, found, None, every)
+            yield OpenPair(answers[0], none, weight, examination, None, every)
 
 
 # What programs make of it

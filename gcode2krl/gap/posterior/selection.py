@@ -100,29 +100,29 @@ def threshold(candidates: float) -> float:
     return float(np.log(max(candidates, 1.0) / _LIMITS.false_alarms))
 
 
-def ranked(found: Examination, gram: Gram, allowed: Sequence[Column]) -> list[Score]:
+def ranked(examination: Examination, gram: Gram, allowed: Sequence[Column]) -> list[Score]:
     """Return the plausible and surprising scores, the best first."""
-    plain = [score for score in scores(gram, allowed) if _is_finding(found, score)]
+    plain = [score for score in scores(gram, allowed) if _is_finding(examination, score)]
     plain.sort(key=lambda score: -_worth(score, gram.values))
     return [
         score
         for score in plain[: _LIMITS.most_tried]
-        if surprise(score.gain / _inflation(found, gram, score), score.column.width) > found.level
+        if surprise(score.gain / _inflation(examination, gram, score), score.column.width) > examination.level
     ]
 
 
-def _is_finding(found: Examination, score: Score) -> bool:
-    plausible = score.within or found.data.candidates.block(score.column).effect.plans_anew
-    large = score.gain > _LIMITS.least_ratio**2 * found.data.times
-    return plausible and large and score.surprise > found.level
+def _is_finding(examination: Examination, score: Score) -> bool:
+    plausible = score.within or examination.data.candidates.block(score.column).effect.plans_anew
+    large = score.gain > _LIMITS.least_ratio**2 * examination.data.times
+    return plausible and large and score.surprise > examination.level
 
 
-def _inflation(found: Examination, gram: Gram, score: Score) -> float:
+def _inflation(examination: Examination, gram: Gram, score: Score) -> float:
     # a signature holds for small effects only, and one at a frequency or moment that is searched is as far
     # off as the search is coarse, where the effect is strongest: such gains are judged after the refit
-    effect = found.data.candidates.block(score.column).effect
+    effect = examination.data.candidates.block(score.column).effect
     is_exact = effect.is_linear and effect.frequency is None and effect.moment is None
-    small = score.gain < found.data.times and is_exact
+    small = score.gain < examination.data.times and is_exact
     return gram.inflation(score.column.index) if small else 1.0
 
 
@@ -131,7 +131,7 @@ def _worth(score: Score, values: int) -> float:
     return score.gain - score.column.width * float(np.log(values))
 
 
-def shortlist(found: Examination, scores: Sequence[Score], values: int) -> list[Score]:
+def shortlist(examination: Examination, scores: Sequence[Score], values: int) -> list[Score]:
     """Return the best score of each of the best few effects that come close to the best one.
 
     Signatures hold for small effects only, so the best linear gain does not decide alone; and that of an
@@ -142,32 +142,29 @@ def shortlist(found: Examination, scores: Sequence[Score], values: int) -> list[
     linear: dict[Key, Score] = {}
     planned: dict[Key, Score] = {}
     for score in scores:
-        block = found.data.candidates.block(score.column)
+        block = examination.data.candidates.block(score.column)
         if block.effect.plans_anew:
             planned.setdefault(block.key, score)
-        elif _worth(score, values) >= least or _is_bent_rival(block, score, scores[0]):
+        elif _worth(score, values) >= least or (
+            not block.effect.is_linear and score.gain > _LIMITS.bent_share * scores[0].gain
+        ):
             linear.setdefault(block.key, score)
     return [*list(linear.values())[: _LIMITS.shortlist], *planned.values()]
 
 
-def _is_bent_rival(block: Block, score: Score, best: Score) -> bool:
-    """Tell whether a candidate that is not proportional to its size may still be the best when refitted."""
-    return not block.effect.is_linear and score.gain > _LIMITS.bent_share * best.gain
-
-
-def within_mismatch(found: Examination, number: int) -> bool:
+def within_mismatch(examination: Examination, number: int) -> bool:
     """Tell whether every number of an accepted effect may be what normal mismatch allows, to 1 sigma."""
-    applied, question = found.applied[number], found.question
-    trace = found.traces[0]
+    applied, question = examination.applied[number], examination.question
+    trace = examination.traces[0]
     duration_s = float(trace.time_s[-1] - trace.time_s[0])
     limits = applied.effect.usual(question.mismatch, duration_s, question.clocks)
     if not limits:
         return False
     if applied.effect.plans_anew:
-        return _time_off_s(found, applied) <= question.mismatch.clock_s
+        return _time_off_s(examination, applied) <= question.mismatch.clock_s
     nominal = applied.effect.nominal(trace.inputs, applied.target)
-    deviation = found.fitted.deviations(number)
-    limits = _with_others(found, applied, limits)
+    deviation = examination.fitted.deviations(number)
+    limits = _with_others(examination, applied, limits)
     return all(
         abs(applied.values[name] - nominal[name])
         <= _LIMITS.mismatch_slack * limits.get(name, 0.0)
@@ -177,19 +174,21 @@ def within_mismatch(found: Examination, number: int) -> bool:
     )
 
 
-def _with_others(found: Examination, applied: Applied, limits: dict[str, float]) -> dict[str, float]:
+def _with_others(examination: Examination, applied: Applied, limits: dict[str, float]) -> dict[str, float]:
     """Return the bounds; usual sizes of others that together have its form add to that of the first size."""
-    size, inputs = applied.effect.sizes[0].name, found.traces[0].inputs
+    size, inputs = applied.effect.sizes[0].name, examination.traces[0].inputs
     typical = applied.effect.start(inputs, applied.target)[size]
     typical -= applied.effect.nominal(inputs, applied.target)[size]
-    more = abs(typical) * found.likelihood.once.allowed_sizes(applied)
+    more = abs(typical) * examination.likelihood.once.allowed_sizes(applied)
     return {**limits, size: limits.get(size, 0.0) + more}
 
 
-def _time_off_s(found: Examination, applied: Applied) -> float:
+def _time_off_s(examination: Examination, applied: Applied) -> float:
     """Return the clock error that would change the signals by as much power as an effect does, in s."""
-    change = sum(float(np.sum((trace.sample([applied]) - trace.nominal) ** 2)) for trace in found.traces)
-    rate = sum(float(np.sum(trace.rate**2)) for trace in found.traces)
+    change = sum(
+        float(np.sum((trace.sample([applied]) - trace.nominal) ** 2)) for trace in examination.traces
+    )
+    rate = sum(float(np.sum(trace.rate**2)) for trace in examination.traces)
     return float(np.sqrt(change / rate)) if rate > 0.0 else 0.0
 
 
@@ -209,24 +208,24 @@ class Twin:
 
 
 def twins_of(
-    found: Examination, applied: Applied, others: Sequence[Applied], tried: Collection[Key]
+    examination: Examination, applied: Applied, others: Sequence[Applied], tried: Collection[Key]
 ) -> list[Twin]:
     """Return the nearest twins of an effect beside others, one of each effect and target that was not tried.
 
     None of two effects that are proportional to their sizes: those their gain compares.
     """
     best: dict[Key, Twin] = {}
-    for twin in _alike(found, applied, others, tried):
+    for twin in _alike(examination, applied, others, tried):
         if twin.share > best.setdefault(twin.start.key, twin).share:
             best[twin.start.key] = twin
     return sorted(best.values(), key=lambda twin: -twin.share)[: _LIMITS.most_twins]
 
 
 def _alike(
-    found: Examination, applied: Applied, others: Sequence[Applied], tried: Collection[Key]
+    examination: Examination, applied: Applied, others: Sequence[Applied], tried: Collection[Key]
 ) -> Iterator[Twin]:
     """Yield the columns of candidates that take nearly all of what a small effect does."""
-    candidates, signatures = found.data.candidates, found.data.signatures
+    candidates, signatures = examination.data.candidates, examination.data.signatures
     allowed = [
         column
         for column in candidates.columns
@@ -236,22 +235,22 @@ def _alike(
     ]
     if not allowed:
         return
-    less = _smaller(applied, found.traces[0].inputs)
-    changes = [trace.sample((*others, less)) - trace.sample(others) for trace in found.traces]
+    less = _smaller(applied, examination.traces[0].inputs)
+    changes = [trace.sample((*others, less)) - trace.sample(others) for trace in examination.traces]
     ends = np.cumsum([change.size for change in changes])[:-1]
-    small = np.split(found.likelihood.whiten(changes)[:, None], ends)
+    small = np.split(examination.likelihood.whiten(changes)[:, None], ends)
     gram = signatures.beside(small).total
     for column in allowed:
         at = 1 + column.index
         weights = solve(gram[np.ix_(at, at)], gram[at, :1])[:, 0]
         share = float(weights @ gram[at, 0]) / max(float(gram[0, 0]), 1e-300)
         if share >= _LIMITS.twin_share:
-            yield Twin(column, _start(found, column, weights / _SMALL), share)
+            yield Twin(column, _start(examination, column, weights / _SMALL), share)
 
 
-def _start(found: Examination, column: Column, weights: Floats) -> Applied:
+def _start(examination: Examination, column: Column, weights: Floats) -> Applied:
     within = np.clip(weights, column.low, column.high)
-    return found.data.candidates.block(column).applied(within, found.traces[0])
+    return examination.data.candidates.block(column).applied(within, examination.traces[0])
 
 
 def _smaller(applied: Applied, inputs: Inputs) -> Applied:
@@ -269,19 +268,21 @@ _PLACED = 2
 """So many of the starts, those nearest to the measured times, are fitted."""
 
 
-def replanned(found: Examination, block: Block, linear: Applied, best_chi2: float) -> Fitted:
+def replanned(examination: Examination, block: Block, linear: Applied, best_chi2: float) -> Fitted:
     """Return the best refit from the numbers that meet the times at which the runs are at each place.
 
     Where these leave many times ``best_chi2``, that of the best other effect, no better ones are searched
     for. Where little more than noise is left of the runs, the first order has to bring a share of its gain.
     """
     hopeless = _LIMITS.hopeless * best_chi2
-    if np.isfinite(best_chi2) and found.fitted.chi2 <= _LIMITS.hopeless * found.data.values:
-        near = refit(found.likelihood, (*found.applied, linear), steps=_NEAR_STEPS)
-        if found.fitted.chi2 - near.chi2 < _LIMITS.bent_share * (found.fitted.chi2 - best_chi2):
+    if np.isfinite(best_chi2) and examination.fitted.chi2 <= _LIMITS.hopeless * examination.data.values:
+        near = refit(examination.likelihood, (*examination.applied, linear), steps=_NEAR_STEPS)
+        if examination.fitted.chi2 - near.chi2 < _LIMITS.bent_share * (examination.fitted.chi2 - best_chi2):
             return near
-    times, likelihood, others = found.data.place_times, found.likelihood, found.applied
-    starts = sorted([linear, *_starts(found, block, linear)], key=lambda each: times.size((*others, each)))
+    times, likelihood, others = examination.data.place_times, examination.likelihood, examination.applied
+    starts = sorted(
+        [linear, *_starts(examination, block, linear)], key=lambda each: times.size((*others, each))
+    )
     placed = [times.fitted(others, start) for start in starts[:_PLACED]]
     rough = [refit(likelihood, (*others, start), steps=2) for start in placed]
     best = min(rough, key=lambda each: each.chi2)
@@ -291,9 +292,9 @@ def replanned(found: Examination, block: Block, linear: Applied, best_chi2: floa
     return min([best, *(refit(likelihood, (*others, each)) for each in better)], key=lambda each: each.chi2)
 
 
-def _starts(found: Examination, block: Block, linear: Applied) -> Iterator[Applied]:
+def _starts(examination: Examination, block: Block, linear: Applied) -> Iterator[Applied]:
     """Yield the effect with all sizes away from nominal by as many typical sizes."""
-    effect, inputs = block.effect, found.traces[0].inputs
+    effect, inputs = block.effect, examination.traces[0].inputs
     nominal, typical = effect.nominal(inputs, block.target), effect.start(inputs, block.target)
     for factor in _STARTS:
         sizes = {
@@ -306,7 +307,7 @@ def _starts(found: Examination, block: Block, linear: Applied) -> Iterator[Appli
         yield Applied(effect, block.target, dict(linear.values) | sizes | dict(block.shape))
 
 
-def with_shown_numbers(found: Examination, fitted: Fitted) -> Fitted:
+def with_shown_numbers(examination: Examination, fitted: Fitted) -> Fitted:
     """Return the refit with those numbers of its last effect held that lower chi2 by too little."""
     *others, last = fitted.applied
     if fitted.at_bound[-1] or last.effect.plans_anew:
@@ -314,22 +315,22 @@ def with_shown_numbers(found: Examination, fitted: Fitted) -> Fitted:
     doubtful = _doubtful(fitted) - last.held
     if not doubtful:
         return fitted
-    sensitivity = sensitivity_of(found.likelihood, fitted, len(others))
-    plain = refit(found.likelihood, (*others, _held(found, last, doubtful)))
+    sensitivity = sensitivity_of(examination.likelihood, fitted, len(others))
+    plain = refit(examination.likelihood, (*others, _held(examination, last, doubtful)))
     if plain.chi2 - fitted.chi2 < _LIMITS.minor_chi2 * sensitivity.inflation():
         return plain
-    return fitted if _carries_over(found, sensitivity, plain) else plain
+    return fitted if _carries_over(examination, sensitivity, plain) else plain
 
 
-def _carries_over(found: Examination, sensitivity: Sensitivity, plain: Fitted) -> bool:
+def _carries_over(examination: Examination, sensitivity: Sensitivity, plain: Fitted) -> bool:
     """Tell whether the numbers lower chi2 of runs that they were not fitted to; true of a single run.
 
     What a model is off by for seconds in one run is one draw there, however many rows it has.
     """
-    values = [trace.measured.size for trace in found.traces]
+    values = [trace.measured.size for trace in examination.traces]
     if len(values) < 2:
         return True
-    before = found.likelihood.residual(plain.applied)
+    before = examination.likelihood.residual(plain.applied)
     return sensitivity.gain_of_left_out(before, np.repeat(np.arange(len(values)), values)) > 0.0
 
 
@@ -342,9 +343,9 @@ def _doubtful(fitted: Fitted) -> frozenset[str]:
     return minor | spanned | free.shapes_at_end(x)
 
 
-def _held(found: Examination, applied: Applied, names: frozenset[str]) -> Applied:
+def _held(examination: Examination, applied: Applied, names: frozenset[str]) -> Applied:
     """Return an effect with some numbers held: sizes nominal, shapes typical."""
-    effect, inputs = applied.effect, found.traces[0].inputs
+    effect, inputs = applied.effect, examination.traces[0].inputs
     nominal, typical = effect.nominal(inputs, applied.target), effect.start(inputs, applied.target)
     fixed = {name: typical[name] if effect.parameter(name).is_shape else nominal[name] for name in names}
     return replace(applied, values={**applied.values, **fixed}, held=applied.held | names)
@@ -367,24 +368,26 @@ def examine(
     nuisance = nuisance_for(traces, question, known)
     still = traces[0].still
     assumed = noise or (noise_of_poses if still else noise_of)(traces, candidates.signatures, nuisance)
-    found = _pruned(_selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed)))
-    if noise is None and found.causes and not still:
+    examination = _pruned(
+        _selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed))
+    )
+    if noise is None and examination.causes and not still:
         # what rings or hums looks like noise until its cause is known
-        quieter = noise_of(traces, candidates.signatures, nuisance, found.applied)
+        quieter = noise_of(traces, candidates.signatures, nuisance, examination.applied)
         if _power(quieter) < _LIMITS.quieter_noise * _power(assumed):
             return examine(link, traces, question, known, quieter)
-    return found
+    return examination
 
 
-def with_rival(found: Examination, number: int, rival: Applied) -> Examination | None:
+def with_rival(examination: Examination, number: int, rival: Applied) -> Examination | None:
     """Return the examination with a rival in place of an accepted effect; None where it fails a test."""
-    others = refit(found.likelihood, found.without(number), steps=_PRUNING_STEPS)
-    before = found.dropping(number, others)
-    key, candidates = rival.key, found.data.candidates
+    others = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
+    before = examination.dropping(number, others)
+    key, candidates = rival.key, examination.data.candidates
     column = next((each for each in candidates.columns if candidates.block(each).key == key), None)
     if column is None:
         return None
-    fitted = refit(found.likelihood, (*others.applied, rival))
+    fitted = refit(examination.likelihood, (*others.applied, rival))
     surprising = _tested(before, _Trial(column.width, candidates.block(column), fitted))
     return None if surprising is None else _with(before, fitted, surprising)
 
@@ -395,71 +398,73 @@ def _power(noise: Sequence[Noise]) -> float:
 
 def _selected(data: LinkData) -> Examination:
     """Return the examination with effects accepted until no candidate passes the tests."""
-    found = Examination(data, refit(data.likelihood, ()))
-    while _may_grow(found):
-        found, grew = _grown(found)
+    examination = Examination(data, refit(data.likelihood, ()))
+    while _may_grow(examination):
+        examination, grew = _grown(examination)
         if not grew:
             break
-    return found
+    return examination
 
 
-def _may_grow(found: Examination) -> bool:
-    room = len(found.causes) < _LIMITS.most_causes and len(found.applied) < _LIMITS.most_effects
-    return room and not _is_met(found)
+def _may_grow(examination: Examination) -> bool:
+    room = len(examination.causes) < _LIMITS.most_causes and len(examination.applied) < _LIMITS.most_effects
+    return room and not _is_met(examination)
 
 
-def _is_met(found: Examination) -> bool:
+def _is_met(examination: Examination) -> bool:
     """Tell whether a link is met to the accuracy of its model: what is left is no noise that averages out.
 
     In the mean, and at all moments: corners are a hundredth of a run.
     """
-    if found.link.model_rms == 0.0 or found.fitted.chi2 >= found.data.values:
+    if examination.link.model_rms == 0.0 or examination.fitted.chi2 >= examination.data.values:
         return False
-    left = [trace.measured - trace.sample(found.applied) for trace in found.traces]
-    own, shared = fitted_mismatch(found.likelihood, left)
-    rest = [r - a - b for r, a, b in zip(left, own, shared, strict=True)]
-    return moments_off(found.traces, rest, found.applied) < _LIMITS.model_off_rows
+    residuals = [trace.measured - trace.sample(examination.applied) for trace in examination.traces]
+    by_run, shared = fitted_mismatch(examination.likelihood, residuals)
+    unexplained = [r - a - b for r, a, b in zip(residuals, by_run, shared, strict=True)]
+    return moments_off(examination.traces, unexplained, examination.applied) < _LIMITS.model_off_rows
 
 
-def _grown(found: Examination) -> tuple[Examination, bool]:
+def _grown(examination: Examination) -> tuple[Examination, bool]:
     """Return the examination after one more round, and whether that accepted an effect."""
-    candidates = found.data.candidates
-    gram = found.data.gram(found.fitted)
-    if not found.observable:
-        found = replace(
-            found,
+    candidates = examination.data.candidates
+    gram = examination.data.gram(examination.fitted)
+    if not examination.observable:
+        examination = replace(
+            examination,
             observable=tuple(gram.observable(column.index) for column in candidates.columns),
             first_level=threshold(tried(candidates.columns)),
         )
-    taken = found.accepted_keys | found.rejected
+    taken = examination.accepted_keys | examination.rejected
     allowed = [column for column in candidates.columns if candidates.block(column).key not in taken]
-    found = replace(found, level=threshold(tried(allowed)))
-    return _accepted(found, ranked(found, gram, allowed), gram.values)
+    examination = replace(examination, level=threshold(tried(allowed)))
+    return _accepted(examination, ranked(examination, gram, allowed), gram.values)
 
 
-def _accepted(found: Examination, scores: Sequence[Score], values: int) -> tuple[Examination, bool]:
+def _accepted(examination: Examination, scores: Sequence[Score], values: int) -> tuple[Examination, bool]:
     """Return the examination with the best refit that passes the tests, and whether one does."""
     while scores:
-        trials = list(_trials(found, shortlist(found, scores, values)))
-        trials += _twin_trials(found, trials)
+        trials = list(_trials(examination, shortlist(examination, scores, values)))
+        trials += _twin_trials(examination, trials)
         for trial in sorted(trials, key=lambda trial: trial.cost):
-            surprising = _tested(found, trial)
+            surprising = _tested(examination, trial)
             if surprising is not None:
-                return _with(found, trial.fitted, surprising), True
-            found = found.rejecting(trial.block.key)
+                return _with(examination, trial.fitted, surprising), True
+            examination = examination.rejecting(trial.block.key)
         scores = [
-            each for each in scores if found.data.candidates.block(each.column).key not in found.rejected
+            score
+            for score in scores
+            if examination.data.candidates.block(score.column).key not in examination.rejected
         ]
-    return found, False
+    return examination, False
 
 
-def _with(found: Examination, fitted: Fitted, surprising: float) -> Examination:
+def _with(examination: Examination, fitted: Fitted, surprising: float) -> Examination:
     """Return the examination with one more effect; the others' numbers have moved with it."""
     grown = replace(
-        found,
+        examination,
         fitted=fitted,
-        surprises=(*found.surprises, surprising),
-        usual=(*found.usual, False),
+        surprises=(*examination.surprises, surprising),
+        usual=(*examination.usual, False),
     )
     usual = tuple(within_mismatch(grown, number) for number in range(len(grown.usual)))
     return replace(grown, usual=usual)
@@ -480,95 +485,95 @@ class _Trial:
         return self.fitted.chi2 + self.fitted.occam
 
 
-def _trials(found: Examination, scores: Sequence[Score]) -> Iterator[_Trial]:
+def _trials(examination: Examination, scores: Sequence[Score]) -> Iterator[_Trial]:
     """Yield the refits; one that is far behind those before it is not carried to its end."""
     best = np.inf
     for score in scores:
-        block = found.data.candidates.block(score.column)
-        start = block.applied(score.coefficients, found.traces[0])
+        block = examination.data.candidates.block(score.column)
+        start = block.applied(score.coefficients, examination.traces[0])
         if block.effect.plans_anew:
-            fitted = replanned(found, block, start, best)
+            fitted = replanned(examination, block, start, best)
         else:
-            fitted = with_shown_numbers(found, _refitted(found, start, best))
+            fitted = with_shown_numbers(examination, _refitted(examination, start, best))
         best = min(best, fitted.chi2)
         yield _Trial(score.column.width, block, fitted)
 
 
-def _twin_trials(found: Examination, trials: Sequence[_Trial]) -> Iterator[_Trial]:
+def _twin_trials(examination: Examination, trials: Sequence[_Trial]) -> Iterator[_Trial]:
     """Yield the refits of candidates that do what the best trial does while it is small."""
     best = min(trials, key=lambda trial: trial.cost)
     if best.block.effect.plans_anew or not np.isfinite(best.cost):
         return
-    tried = {*(trial.block.key for trial in trials), *found.accepted_keys, *found.rejected}
-    for twin in twins_of(found, best.fitted.applied[-1], found.applied, tried):
-        fitted = with_shown_numbers(found, _refitted(found, twin.start, best.fitted.chi2))
-        yield _Trial(twin.column.width, found.data.candidates.block(twin.column), fitted)
+    tried = {*(trial.block.key for trial in trials), *examination.accepted_keys, *examination.rejected}
+    for twin in twins_of(examination, best.fitted.applied[-1], examination.applied, tried):
+        fitted = with_shown_numbers(examination, _refitted(examination, twin.start, best.fitted.chi2))
+        yield _Trial(twin.column.width, examination.data.candidates.block(twin.column), fitted)
 
 
-def _refitted(found: Examination, start: Applied, best: float) -> Fitted:
+def _refitted(examination: Examination, start: Applied, best: float) -> Fitted:
     """Return the refit of a candidate, ended early where it is behind the best by a share of the gain."""
     alone = len(start.effect.parameters) == 1
-    start = _best_alternative(found, start)
-    fitted = refit(found.likelihood, (*found.applied, start), steps=_FIRST_STEPS, scan=alone)
+    start = _best_alternative(examination, start)
+    fitted = refit(examination.likelihood, (*examination.applied, start), steps=_FIRST_STEPS, scan=alone)
     best = min(best, fitted.chi2)
-    if fitted.chi2 <= best + _LIMITS.behind_share * (found.fitted.chi2 - best):
-        return refit(found.likelihood, fitted.applied)
+    if fitted.chi2 <= best + _LIMITS.behind_share * (examination.fitted.chi2 - best):
+        return refit(examination.likelihood, fitted.applied)
     return fitted
 
 
-def _best_alternative(found: Examination, start: Applied) -> Applied:
+def _best_alternative(examination: Examination, start: Applied) -> Applied:
     """Return the best of what looks like an effect to first order."""
     alternatives = [replace(start, values=values) for values in start.effect.alternatives(start.values)]
     if len(alternatives) == 1:
         return start
-    return min(alternatives, key=lambda each: found.likelihood.chi2((*found.applied, each)))
+    return min(alternatives, key=lambda each: examination.likelihood.chi2((*examination.applied, each)))
 
 
-def _tested(found: Examination, trial: _Trial) -> float | None:
+def _tested(examination: Examination, trial: _Trial) -> float | None:
     """Return how surprising a trial's gain is; None where it fails a test.
 
     It must be no bound hit, large enough, surprising beside the scatter over stretches of time, and lower
     chi2 on stretches that its numbers were not fitted to.
     """
     fitted = trial.fitted
-    gain = found.fitted.chi2 - fitted.chi2
+    gain = examination.fitted.chi2 - fitted.chi2
     last = fitted.numbers.free[-1]
     pushed = last.shapes_at_end(fitted.x[fitted.numbers.slices[-1]])  # the data want a form beyond its range
-    if fitted.at_bound[-1] or pushed or gain < _LIMITS.least_ratio**2 * found.data.times:
+    if fitted.at_bound[-1] or pushed or gain < _LIMITS.least_ratio**2 * examination.data.times:
         return None
-    sensitivity = sensitivity_of(found.likelihood, fitted, len(fitted.applied) - 1)
+    sensitivity = sensitivity_of(examination.likelihood, fitted, len(fitted.applied) - 1)
     # shapes are searched too, so that chi2 has a degree for each of them
     surprising = surprise(gain / sensitivity.inflation(), max(trial.width, len(last.names)))
-    if surprising < found.level:
+    if surprising < examination.level:
         return None
     if trial.block.effect.plans_anew:
         return surprising
-    before = found.likelihood.residual(found.applied)
+    before = examination.likelihood.residual(examination.applied)
     return surprising if sensitivity.left_out_gain(before, _LIMITS.left_out_groups) > 0.0 else None
 
 
-def _pruned(found: Examination) -> Examination:
+def _pruned(examination: Examination) -> Examination:
     """Return the examination without effects that bring little of the whole gain where they act.
 
     An effect of one joint is compared with the gain in that joint.
     """
-    before = found.likelihood.residual(()) if len(found.applied) > 1 else np.zeros(0)
-    while len(found.applied) > 1:
-        after = found.likelihood.residual(found.applied)
+    before = examination.likelihood.residual(()) if len(examination.applied) > 1 else np.zeros(0)
+    while len(examination.applied) > 1:
+        after = examination.likelihood.residual(examination.applied)
         refits = [
-            refit(found.likelihood, found.without(number), steps=_PRUNING_STEPS)
-            for number in range(len(found.applied))
+            refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
+            for number in range(len(examination.applied))
         ]
         shares = []
         for number, refitted in enumerate(refits):
-            rows = np.flatnonzero(found.rows_changed(number))
+            rows = np.flatnonzero(examination.rows_changed(number))
             whole = float(np.sum(before[rows] ** 2) - np.sum(after[rows] ** 2))
-            shares.append((refitted.chi2 - found.fitted.chi2) / max(whole, 1e-30))
+            shares.append((refitted.chi2 - examination.fitted.chi2) / max(whole, 1e-30))
         least = int(np.argmin(shares))
         if shares[least] >= _LIMITS.prune_share:
-            return found
-        found = found.dropping(least, refits[least])
-    return found
+            return examination
+        examination = examination.dropping(least, refits[least])
+    return examination
 
 
 _SETTLED = 0.1
@@ -607,57 +612,61 @@ class Rival:
         return self.behind_nats < declared_nats() or self.distance2 < _LIMITS.model_error**2
 
 
-def rivals_of(found: Examination, number: int) -> list[Rival]:
+def rivals_of(examination: Examination, number: int) -> list[Rival]:
     """Return the best other effects in place of an accepted one, each refitted along with the rest."""
-    others = found.without(number)
-    spread = sensitivity_of(found.likelihood, found.fitted, number).inflation()
-    gain = found.likelihood.chi2(others) - found.fitted.chi2
-    residual = found.likelihood.residual(found.applied)
+    others = examination.without(number)
+    spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
+    gain = examination.likelihood.chi2(others) - examination.fitted.chi2
+    residual = examination.likelihood.residual(examination.applied)
     rivals: dict[Key, Rival] = {}
-    for start in itertools.chain(_rival_twins(found, number), _of_gain(found, number, gain, spread)):
+    for start in itertools.chain(
+        _rival_twins(examination, number), _of_gain(examination, number, gain, spread)
+    ):
         if start.key in rivals or len(rivals) >= _LIMITS.most_rivals:
             continue
         bent = not start.effect.is_linear
-        fitted = refit(found.likelihood, (*others, start), steps=_STEPS, scan=bent)
+        fitted = refit(examination.likelihood, (*others, start), steps=_STEPS, scan=bent)
         if fitted.at_bound[-1] or not np.isfinite(fitted.chi2):
             continue
-        difference = (fitted.chi2 - found.fitted.chi2) / spread
-        cost = difference + fitted.occam - found.fitted.occam
-        apart = found.likelihood.residual(fitted.applied) - residual
+        difference = (fitted.chi2 - examination.fitted.chi2) / spread
+        cost = difference + fitted.occam - examination.fitted.occam
+        apart = examination.likelihood.residual(fitted.applied) - residual
         distance2 = float(apart @ apart) / max(gain, 1e-300)
         rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
 
 
-def _of_gain(found: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
+def _of_gain(examination: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
     """Yield other effects whose linear gain comes near that of a cause."""
-    for score in _ranked(found, number):
-        block = found.data.candidates.block(score.column)
+    for score in _ranked(examination, number):
+        block = examination.data.candidates.block(score.column)
         share = _LIMITS.rival_share if block.effect.is_linear else _LIMITS.bent_rival_share
         if score.gain >= gain - max(share * gain, _LIMITS.rival_gain * spread):
-            yield block.applied(score.coefficients, found.traces[0])
+            yield block.applied(score.coefficients, examination.traces[0])
 
 
-def _rival_twins(found: Examination, number: int) -> Iterator[Applied]:
+def _rival_twins(examination: Examination, number: int) -> Iterator[Applied]:
     """Yield other effects that do what a cause does while it is small."""
-    cause = found.applied[number]
+    cause = examination.applied[number]
     if not cause.effect.plans_anew:
-        twins = twins_of(found, cause, found.without(number), found.accepted_keys)
+        twins = twins_of(examination, cause, examination.without(number), examination.accepted_keys)
         yield from (twin.start for twin in twins)
 
 
-def _ranked(found: Examination, number: int) -> list[Score]:
+def _ranked(examination: Examination, number: int) -> list[Score]:
     """Return the plausible scores of other effects with one accepted effect taken away, the best first."""
-    gram = found.data.gram(found.fitted, without=number)
-    candidates = found.data.candidates
+    gram = examination.data.gram(examination.fitted, without=number)
+    candidates = examination.data.candidates
     columns = [
-        column for column in candidates.columns if candidates.block(column).key not in found.accepted_keys
+        column
+        for column in candidates.columns
+        if candidates.block(column).key not in examination.accepted_keys
     ]
     return sorted((score for score in scores(gram, columns) if score.within), key=lambda score: -score.gain)
 
 
-def rival_probabilities(rivals: Sequence[Rival], own: float) -> list[float]:
-    """Return the probability of each rival of a cause that has the probability ``own``.
+def rival_probabilities(rivals: Sequence[Rival], of_cause: float) -> list[float]:
+    """Return the probability of each rival of a cause that has the probability ``of_cause``.
 
     Rivals that the data cannot tell from the cause share its probability: theirs is the same one. Of what it
     leaves the others have their shares by evidence, over the temperature as no model is exact.
@@ -665,5 +674,5 @@ def rival_probabilities(rivals: Sequence[Rival], own: float) -> list[float]:
     costs = np.maximum([rival.cost_difference for rival in rivals], 0.0)
     apart = np.array([not rival.alike for rival in rivals], dtype=bool)
     weights = np.where(apart, np.exp(-costs / (2.0 * _LIMITS.temperature)), 0.0)
-    shares = (1.0 - own) * weights / (1.0 + weights.sum())
-    return [own if rival.alike else float(share) for rival, share in zip(rivals, shares, strict=True)]
+    shares = (1.0 - of_cause) * weights / (1.0 + weights.sum())
+    return [of_cause if rival.alike else float(share) for rival, share in zip(rivals, shares, strict=True)]

@@ -64,14 +64,14 @@ class FrameTest:
         candidates = list(_candidates(pairs, library))
         if not candidates:
             return []
-        best, left = best_of(traces, candidates)
+        best, after = best_of(traces, candidates)
         if best.effect.name == _BASE:
             best = _refined(traces, best)
-            left = rms_left(traces, best)
+            after = rms_left(traces, best)
         if not all(_brings_back(pair, best) for pair in pairs):
             return []
         what = f"tool {best.target}" if best.effect.name == _TOOL else "base another one"
-        slips = slip_if_explained(traces, best, left, f"the commanded joints are those of {what}")
+        slips = slip_if_explained(traces, best, after, f"the commanded joints are those of {what}")
         return [replace(slip, alike=_alike(best, pairs)) for slip in slips]
 
 

@@ -56,7 +56,7 @@ def along_one(
     if every is None or d == 1 or len(columns) <= d:
         return None
     along = _main_axis(every, family)
-    found = evidence_of(
+    evidence = evidence_of(
         view,
         family.place,
         family.on,
@@ -66,7 +66,7 @@ def along_one(
         signs,
         cost=float(np.log(max(every.gain, 1.0))),
     )
-    return None if found is None else replace(found, flipped=every.flipped, unbounded=every.unbounded)
+    return None if evidence is None else replace(evidence, flipped=every.flipped, unbounded=every.unbounded)
 
 
 def _main_axis(every: Evidence, family: Family) -> Floats:
@@ -109,27 +109,28 @@ def simplest_first(evidences: Iterable[Evidence]) -> tuple[Evidence, ...]:
 
     Unless that one is ahead by more than `ahead_share` of its own evidence.
     """
-    told = sorted(evidences, key=lambda evidence: -evidence.nats)
+    ranked = sorted(evidences, key=lambda evidence: -evidence.nats)
     moved = True
     while moved:  # a smaller one only ever rises
         moved = False
-        for i, larger in enumerate(told):
-            j = next((j for j in range(i + 1, len(told)) if _is_within(told[j], larger)), None)
-            if j is None or larger.nats - told[j].nats >= _ahead_share(larger) * larger.nats:
+        for i, larger in enumerate(ranked):
+            contained = (
+                j
+                for j, smaller in enumerate(ranked[i + 1 :], i + 1)
+                if smaller.place.name == larger.place.name and smaller.on in CONTAINS.get(larger.on, ())
+            )
+            j = next(contained, None)
+            if j is None or larger.nats - ranked[j].nats >= _ahead_share(larger) * larger.nats:
                 continue
-            told[i], told[j] = replace(told[j], nats=larger.nats), replace(larger, nats=told[j].nats)
+            ranked[i], ranked[j] = replace(ranked[j], nats=larger.nats), replace(larger, nats=ranked[j].nats)
             moved = True
-    return tuple(told)
+    return tuple(ranked)
 
 
 def _ahead_share(larger: Evidence) -> float:
     """Return the share of its evidence from which on a larger family is ahead of one within it."""
     is_time = larger.on is Dependence.RUN_TIME
     return THRESHOLDS.families.time_ahead_share if is_time else THRESHOLDS.families.ahead_share
-
-
-def _is_within(smaller: Evidence, larger: Evidence) -> bool:
-    return smaller.place.name == larger.place.name and smaller.on in CONTAINS.get(larger.on, ())
 
 
 _STEP_S = THRESHOLDS.families.step_s
@@ -187,11 +188,11 @@ class Steps:
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
             after = np.zeros((len(trace.time_s), width + 2))
             after[:, width] = 1.0
-            own = [i for i, (run, *_) in enumerate(moments) if run == number]
-            for column, i in enumerate(own):
+            of_run = [i for i, (run, *_) in enumerate(moments) if run == number]
+            for column, i in enumerate(of_run):
                 after[:, column] = trace.time_s >= moments[i][1]
             at = np.array([width + 1 - self._is_in(number, each) for each in moments], dtype=int)
-            at[own] = np.arange(len(own))
+            at[of_run] = np.arange(len(of_run))
             raw.append(_lifted(after, unit))
             chosen.append(at)
         white, d = self.rows.of(raw, self.place.component), self.place.width
@@ -211,7 +212,7 @@ class Steps:
 
     def columns(self, moments: Sequence[Moment]) -> list[Floats]:
         """Return the columns (k, n, moments·d) of each trace."""
-        found = []
+        columns = []
         for number, (trace, unit) in enumerate(zip(self.traces, self.place.units, strict=True)):
             after = np.stack(
                 [
@@ -222,8 +223,8 @@ class Steps:
                 ],
                 axis=1,
             )
-            found.append(_lifted(after, unit))
-        return found
+            columns.append(_lifted(after, unit))
+        return columns
 
 
 def _lifted(after: Floats, unit: Floats) -> Floats:
@@ -238,17 +239,20 @@ def scan(view: View, steps: Steps, columns: Columns, signs: Floats) -> tuple[Flo
     ``columns`` of these moments, d a moment.
     """
     d = steps.place.width
-    beside = Beside(view, columns)
-    own = columns.values.reshape(len(columns.values), -1, d)
-    fixed, taken = beside.fixed.reshape(own.shape[1], d, -1), beside.taken.T.reshape(own.shape[1], d, -1)
-    gram = np.einsum("vmi,vmj->mij", own, own) - fixed @ taken.swapaxes(1, 2)
+    projected = Beside(view, columns)
+    by_moment = columns.values.reshape(len(columns.values), -1, d)
+    fixed, taken = (
+        projected.fixed.reshape(by_moment.shape[1], d, -1),
+        projected.taken.T.reshape(by_moment.shape[1], d, -1),
+    )
+    gram = np.einsum("vmi,vmj->mij", by_moment, by_moment) - fixed @ taken.swapaxes(1, 2)
     values, vectors = np.linalg.eigh((gram + gram.swapaxes(1, 2)) / 2.0)
     values = np.maximum(values, 0.0)
-    score = beside.score.reshape(-1, d)
+    score = projected.score.reshape(-1, d)
     evidence = _each(values, np.einsum("mij,mi->mj", vectors, score))
     if not len(signs):
         return evidence, np.zeros((0, len(evidence)))
-    flipped = (signs @ beside.scores).reshape(len(signs), len(gram), d)
+    flipped = (signs @ projected.scores).reshape(len(signs), len(gram), d)
     return evidence, _each(values, np.einsum("mij,fmi->fmj", vectors, flipped))
 
 
@@ -274,14 +278,14 @@ def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
     # some moments at a time: the columns of all are many times the data
     some = [moments[first : first + _AT_ONCE] for first in range(0, len(moments), _AT_ONCE)]
     scans = [scan(view, steps, Columns(steps.blocks(each)), signs) for each in some]
-    own, flipped = (np.concatenate(each, axis=-1) for each in zip(*scans, strict=True))
-    finer = steps.finer(moments[int(np.argmax(own))])
+    log_evidences, flipped = (np.concatenate(each, axis=-1) for each in zip(*scans, strict=True))
+    finer = steps.finer(moments[int(np.argmax(log_evidences))])
     fine = steps.blocks(finer)
     near, _ = scan(view, steps, Columns(fine), signs[:0])
     best = int(np.argmax(near))
     d = steps.place.width
-    cost = float(np.max(own) - log_mean(own))
-    found = evidence_of(
+    cost = float(np.max(log_evidences) - log_mean(log_evidences))
+    evidence = evidence_of(
         view,
         steps.place,
         Dependence.RUN_TIME_STEP,
@@ -292,7 +296,7 @@ def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
         at=finer[best][:2],
         cost=cost,
     )
-    return None if found is None else replace(found, flipped=log_mean(flipped), stays=finer[best][2])
+    return None if evidence is None else replace(evidence, flipped=log_mean(flipped), stays=finer[best][2])
 
 
 _LIMITS = THRESHOLDS.families
@@ -311,7 +315,7 @@ def tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator[Evide
     for peak in _peaks(power):
         raw = list(_tone_columns(place, rows.traces, float(hz[peak])))
         columns = Columns(rows.of(raw, place.component))
-        found = evidence_of(
+        evidence = evidence_of(
             view,
             place,
             Dependence.TONE,
@@ -322,8 +326,8 @@ def tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator[Evide
             at=(-1, float(hz[peak])),
             cost=float(np.log(count)),
         )
-        if found is not None:
-            yield found
+        if evidence is not None:
+            yield evidence
 
 
 def _spectrum(rows: Rows, view: View) -> tuple[Floats, Floats, int]:
@@ -331,8 +335,8 @@ def _spectrum(rows: Rows, view: View) -> tuple[Floats, Floats, int]:
     length = _TONES_FINER * max(len(starts) for starts in rows.starts)
     hz: Floats = np.asarray(np.fft.rfftfreq(length, rows.step_s), dtype=np.float64)
     power = np.zeros(len(hz))
-    for own in _of_runs(rows, view):
-        power += np.sum(np.abs(np.fft.rfft(own, length, axis=1)) ** 2, axis=0)
+    for of_run in _of_runs(rows, view):
+        power += np.sum(np.abs(np.fft.rfft(of_run, length, axis=1)) ** 2, axis=0)
     inside = (hz >= _LIMITS.tone_least_hz) & (hz <= 0.45 / rows.step_s)
     return hz[inside], power[inside], max(1, int(inside.sum()) // _TONES_FINER)
 
@@ -341,19 +345,19 @@ def _of_runs(rows: Rows, view: View) -> Iterator[Floats]:
     """Yield the projected residual (k, blocks) of each run."""
     k = len(np.unique(view.components))
     ends = np.cumsum([k * len(starts) for starts in rows.starts])[:-1]
-    for own in np.split(view.projected, ends):
-        yield own.reshape(k, -1)
+    for of_run in np.split(view.projected, ends):
+        yield of_run.reshape(k, -1)
 
 
 def _peaks(power: Floats) -> list[int]:
     """Return the places of the highest peaks, none within a resolved frequency of a higher one."""
-    found: list[int] = []
+    peaks: list[int] = []
     for i in np.argsort(-power):
-        if all(abs(int(i) - other) > 2 * _TONES_FINER for other in found):
-            found.append(int(i))
-        if len(found) == _PEAKS:
+        if all(abs(int(i) - other) > 2 * _TONES_FINER for other in peaks):
+            peaks.append(int(i))
+        if len(peaks) == _PEAKS:
             break
-    return found
+    return peaks
 
 
 def _tone_columns(place: Place, traces: Sequence[Trace], hz: float) -> Iterator[Floats]:
@@ -380,7 +384,7 @@ def angle_tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator
         unit * np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1)[None]
         for angle, unit in zip(angles, place.units, strict=True)
     ]
-    found = evidence_of(
+    evidence = evidence_of(
         view,
         place,
         Dependence.MOTOR_ANGLE,
@@ -391,8 +395,8 @@ def angle_tones(rows: Rows, view: View, place: Place, signs: Floats) -> Iterator
         at=(-1, order),
         cost=float(np.log(len(orders) / _TONES_FINER)),
     )
-    if found is not None:
-        yield found
+    if evidence is not None:
+        yield evidence
 
 
 def _angle(trace: Trace, joint: int) -> Floats:
@@ -463,21 +467,21 @@ class Study:
 
 def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> list[Study]:
     """Return what every family says of some views of the same rows."""
-    found: list[list[Evidence]] = [[] for _ in views]
+    by_view: list[list[Evidence]] = [[] for _ in views]
     signs = [_signs(view, seed) for view in views]
     for family in grid.families():
         place = family.place
         columns = Columns(rows.of(family.columns, place.component))
-        for view, own, sign in zip(views, found, signs, strict=True):
+        for view, of_view, sign in zip(views, by_view, signs, strict=True):
             at = view.at(place.component)
             every = evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)
-            _add(own, [every, along_one(at, every, family, columns, sign)])
+            _add(of_view, [every, along_one(at, every, family, columns, sign)])
     for place in grid.places:
-        for own, evidences in zip(found, _searched(rows, views, place, signs), strict=True):
-            _add(own, evidences)
+        for of_view, evidences in zip(by_view, _searched(rows, views, place, signs), strict=True):
+            _add(of_view, evidences)
     return [
-        _study(view, own, functools.partial(_moved, rows, view, grid))
-        for view, own in zip(views, found, strict=True)
+        _study(view, of_view, functools.partial(_moved, rows, view, grid))
+        for view, of_view in zip(views, by_view, strict=True)
     ]
 
 
@@ -495,8 +499,8 @@ def _searched(
         ]
 
 
-def _add(found: list[Evidence], evidences: Sequence[Evidence | None]) -> None:
-    found += [each for each in evidences if each is not None]
+def _add(known: list[Evidence], evidences: Sequence[Evidence | None]) -> None:
+    known += [each for each in evidences if each is not None]
 
 
 def _signs(view: View, seed: int) -> Floats:
@@ -506,32 +510,32 @@ def _signs(view: View, seed: int) -> Floats:
     return np.where(generator.random(shape) < 0.5, -1.0, 1.0)
 
 
-def _study(view: View, found: Sequence[Evidence], moved: Callable[[], Floats]) -> Study:
+def _study(view: View, evidences: Sequence[Evidence], moved: Callable[[], Floats]) -> Study:
     """Return the study: one evidence for each place and input, and p of the largest."""
     best: dict[object, Evidence] = {}
-    for each in sorted(found, key=lambda evidence: -evidence.nats):
-        best.setdefault(each.key, each)
-    if not found:
+    for family in sorted(evidences, key=lambda evidence: -evidence.nats):
+        best.setdefault(family.key, family)
+    if not evidences:
         return Study(view.chi2, (), 1.0)
-    nats = max(each.unbounded for each in found)
+    nats = max(each.unbounded for each in evidences)
     return Study(
         view.chi2,
         simplest_first(best.values()),
-        _p(found, nats),
-        _tail_p(_largest(found), nats),
+        _p(evidences, nats),
+        _tail_p(_largest(evidences), nats),
         moved,
     )
 
 
-def _largest(found: Sequence[Evidence]) -> Floats:
+def _largest(evidences: Sequence[Evidence]) -> Floats:
     """Return the largest evidence (flips,) over all families for random signs of stretches."""
-    largest: Floats = np.max(np.stack([each.flipped for each in found]), axis=0)
+    largest: Floats = np.max(np.stack([each.flipped for each in evidences]), axis=0)
     return largest
 
 
-def _p(found: Sequence[Evidence], nats: float) -> float:
+def _p(evidences: Sequence[Evidence], nats: float) -> float:
     """Return p of an evidence, from the largest over all families for random signs of stretches."""
-    random = _largest(found)
+    random = _largest(evidences)
     return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))
 
 
