@@ -7,7 +7,7 @@ import pytest
 from gcode2krl.effects import inputs_of
 from gcode2krl.errors import Issue
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.compare.slips import CheckTest, checked
+from gcode2krl.gap.compare.slips import check_slip, checked
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, prediction, runs
 
 
@@ -23,7 +23,7 @@ def _error(code, message="tracker.csv: column x_mm is odd"):
 
 def test_a_run_of_the_prediction_passes(pair):
     assert checked([pair]) == []
-    assert CheckTest(()).find([pair], LIBRARY) == []
+    assert check_slip([pair], LIBRARY, ()) == []
 
 
 def test_swapped_columns_end_the_comparison(pair):
@@ -34,7 +34,7 @@ def test_swapped_columns_end_the_comparison(pair):
     )
     issues = checked([replace(pair, run=swapped)])
     assert {issue.code for issue in issues} == {"run-axes"}
-    (slip,) = CheckTest(tuple(issues)).find([pair], LIBRARY)
+    (slip,) = check_slip([pair], LIBRARY, tuple(issues))
     assert (slip.applied.effect.name, slip.applied.target, slip.final) == ("unit", "tracker", True)
     assert slip.words == issues[0].message
     assert slip.rms_after is None
@@ -53,12 +53,12 @@ def test_a_log_alone_has_nothing_to_be_checked_against(pair):
     ("code", "effect"), [("run-unit", "unit"), ("run-axes", "unit"), ("run-program", "other_program")]
 )
 def test_an_error_is_the_slip_of_its_code(pair, code, effect):
-    (slip,) = CheckTest((_error("run-clock"), _error(code))).find([pair], LIBRARY)
+    (slip,) = check_slip([pair], LIBRARY, (_error("run-clock"), _error(code)))
     assert slip.applied.effect.name == effect
 
 
 def test_warnings_and_excluded_effects_end_nothing(pair):
     warning = replace(_error("run-unit"), severity="warning")
-    assert CheckTest((warning,)).find([pair], LIBRARY) == []
+    assert check_slip([pair], LIBRARY, (warning,)) == []
     without = {name: effect for name, effect in LIBRARY.items() if name != "unit"}
-    assert CheckTest((_error("run-unit"),)).find([pair], without) == []
+    assert check_slip([pair], without, (_error("run-unit"),)) == []

@@ -6,7 +6,7 @@ import pytest
 
 from gcode2krl.effects import inputs_of
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.compare.slips import _UNITS, ForceUnitTest
+from gcode2krl.gap.compare.slips import _UNITS, force_unit_slip
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, prediction, runs
 
 
@@ -30,16 +30,16 @@ def test_a_factor_is_how_many_of_the_unit_a_newton_is():
 
 @pytest.mark.parametrize("factor", _UNITS)
 def test_a_unit_is_found(pair, factor):
-    (slip,) = ForceUnitTest().find([_times(pair, factor)], LIBRARY)
+    (slip,) = force_unit_slip([_times(pair, factor)], LIBRARY)
     assert (slip.applied.target, slip.applied["factor"]) == ("force", factor)
     assert _UNITS[factor] in slip.words
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 0.3, -1.0])
 def test_another_factor_is_no_unit(pair, factor):
-    assert ForceUnitTest().find([_times(pair, factor)], LIBRARY) == []
+    assert force_unit_slip([_times(pair, factor)], LIBRARY) == []
 
 
 def test_without_forces_or_effect_there_is_none(pair):
-    assert ForceUnitTest().find([replace(pair, run=replace(pair.run, force=None))], LIBRARY) == []
-    assert ForceUnitTest().find([_times(pair, 1e-3)], {}) == []
+    assert force_unit_slip([replace(pair, run=replace(pair.run, force=None))], LIBRARY) == []
+    assert force_unit_slip([_times(pair, 1e-3)], {}) == []

@@ -8,7 +8,7 @@ import pytest
 
 from gcode2krl.effects import inputs_of
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.posterior.set_up import FrameTest, frame_values
+from gcode2krl.gap.posterior.set_up import frame_slip, frame_values
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 
@@ -30,7 +30,7 @@ def test_the_base_is_fitted_beside_a_clock():
     text = "base_number:x_mm=30,y_mm=-12,z_mm=4,a_deg=2,b_deg=0.5"
     pair = _pair(text)
     late = replace(pair, clock_s={"controller": 0.003})
-    (slip,) = FrameTest().find([late], LIBRARY)
+    (slip,) = frame_slip([late], LIBRARY)
     truth = applied(text)[0]
     for name, value in truth.values.items():
         assert slip.applied[name] == pytest.approx(value, abs=2e-3), name
@@ -39,7 +39,7 @@ def test_the_base_is_fitted_beside_a_clock():
 
 
 def test_another_tool_that_is_a_mere_shift_may_be_a_base_as_well():
-    (slip,) = FrameTest().find([_pair("tool_number:target=5")], LIBRARY)
+    (slip,) = frame_slip([_pair("tool_number:target=5")], LIBRARY)
     assert (slip.applied.effect.name, slip.applied.target) == ("tool_number", "5")
     assert slip.words == "the commanded joints are those of tool 5"
     assert slip.alike == (("base_number", None),)
@@ -47,13 +47,13 @@ def test_another_tool_that_is_a_mere_shift_may_be_a_base_as_well():
 
 @pytest.mark.parametrize("text", ["base_number:x_mm=0.05", "servo_lag:target=A1,tau_s=0.01"])
 def test_small_differences_are_no_other_frame(text):
-    assert FrameTest().find([_pair(text)], LIBRARY) == []
+    assert frame_slip([_pair(text)], LIBRARY) == []
 
 
 def test_only_effects_of_the_library_are_tried():
     pair = _pair("base_number:x_mm=30,a_deg=2")
-    assert FrameTest().find([pair], {}) == []
-    assert FrameTest().find([pair], {"tool_number": LIBRARY["tool_number"]}) == []
+    assert frame_slip([pair], {}) == []
+    assert frame_slip([pair], {"tool_number": LIBRARY["tool_number"]}) == []
 
 
 def test_a_rotation_and_a_shift_are_the_values_of_a_frame():

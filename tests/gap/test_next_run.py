@@ -17,7 +17,6 @@ from gcode2krl.gap.posterior.next_run import (
     Answer,
     Apart,
     Choice,
-    Family,
     OpenPair,
     Parting,
     best,
@@ -114,10 +113,8 @@ def test_an_unsure_cause_is_open_against_its_rivals_and_the_unknown(offset):
 
 
 def test_families_of_the_link_are_open_beside_a_cause_and_among_each_other(offset):
-    drift = Family("mechanics", "tip", "wall clock", "drift", 0.5)
-    place = Family("mechanics", "tip", "constant", "smooth", 0.3)
-    elsewhere = Family("gear", "A2", "reversals", "loop", 0.9)
-    families = [drift, place, elsewhere]
+    drift, place = Answer("tip, wall clock", 0.5), Answer("tip, constant", 0.3)
+    families = {"mechanics": [drift, place], "gear": [Answer("A2, reversals", 0.9)]}
     alone = judgement(offset, verdict="unexplained")
     assert labels(open_pairs([alone], families)) == [("tip, wall clock", "tip, constant", 0.15)]
     named = judgement(offset, cause(offset, 0.98), verdict="partly_explained")
@@ -126,7 +123,9 @@ def test_families_of_the_link_are_open_beside_a_cause_and_among_each_other(offse
         ("tool_frame", "tip, constant", 0.3),
     ]
     doubted = judgement(offset, cause(offset, 0.02, alike(FRAME, 0.02)), verdict="unexplained")
-    assert labels(open_pairs([doubted], [drift])) == [("tip, wall clock", "something else", 0.25)]
+    assert labels(open_pairs([doubted], {"mechanics": [drift]})) == [
+        ("tip, wall clock", "something else", 0.25)
+    ]
 
 
 def of_joint(number):
@@ -136,12 +135,12 @@ def of_joint(number):
 
 def test_families_of_two_joints_are_no_rivals_and_one_that_stands_alone_has_to_foretell(offset):
     families = [
-        Family("mechanics", "A1", "jerk", "smooth", 0.93, of_joint(0)),
-        Family("mechanics", "A3", "jerk", "smooth", 0.4, of_joint(2)),
-        Family("mechanics", "A3", "velocity", "smooth", 0.3, of_joint(2)),
+        Answer("A1, jerk", 0.93, evidence=of_joint(0)),
+        Answer("A3, jerk", 0.4, evidence=of_joint(2)),
+        Answer("A3, velocity", 0.3, evidence=of_joint(2)),
     ]
     alone = judgement(offset, verdict="unexplained")
-    assert labels(open_pairs([alone], families)) == [
+    assert labels(open_pairs([alone], {"mechanics": families})) == [
         ("A1, jerk", "something else", 0.0651),
         ("A3, jerk", "A3, velocity", 0.12),
     ]

@@ -7,8 +7,8 @@ import pytest
 from gcode2krl.effects import inputs_of
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
+from gcode2krl.gap.compare import slips
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.compare.slips import CheckTest, ClockTest
 from gcode2krl.gap.compare.trace import Context
 from gcode2krl.gap.posterior import set_up
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
@@ -24,36 +24,34 @@ def _context(text="", exclude=(), **signals):
 
 
 def test_every_effect_that_a_test_looks_for_is_in_the_library():
-    for test in (*set_up.TESTS, CheckTest(()), ClockTest()):
-        assert test.effects
-        assert set(test.effects) <= set(LIBRARY)
+    names = {slips._CLOCK, slips._FORCE_UNIT, slips._OVERRIDE, slips._OTHER_PROGRAM, slips._STOPS}
+    names |= {set_up._TOOL, set_up._BASE, set_up._TRACKER_FRAME, *slips._EFFECT_OF.values()}
+    assert names <= set(LIBRARY)
 
 
 def test_the_first_test_that_finds_a_slip_ends_the_search(monkeypatch):
-    class Finds:
-        effects = ("unit",)
+    asked = []
 
-        def __init__(self, slips):
-            self.slips, self.asked = slips, False
+    def finding(result):
+        def test(pairs, library):
+            asked.append(result)
+            return result
 
-        def find(self, pairs, library):
-            self.asked = True
-            return self.slips
+        return test
 
-    tests = [Finds([]), Finds(["first"]), Finds(["second"])]
-    monkeypatch.setattr(set_up, "TESTS", tuple(tests))
+    monkeypatch.setattr(set_up, "TESTS", tuple(finding(each) for each in ([], ["first"], ["second"])))
     assert set_up.first_slip([], LIBRARY) == ["first"]
-    assert [test.asked for test in tests] == [True, True, False]
+    assert asked == [[], ["first"]]
 
 
 def test_the_checks_of_the_runs_come_last():
     issue = Issue("error", "run-unit", 2, "controller.csv: radians", "")
     override = _context("override:percent=60", tracker=False)
-    slips = set_up.first_slip(override.pairs, LIBRARY, [issue])
-    assert [slip.applied.effect.name for slip in slips] == ["override"]
+    named = set_up.first_slip(override.pairs, LIBRARY, [issue])
+    assert [slip.applied.effect.name for slip in named] == ["override"]
     sound = _context(tracker=False)
-    slips = set_up.first_slip(sound.pairs, LIBRARY, [issue])
-    assert [(slip.applied.effect.name, slip.final) for slip in slips] == [("unit", True)]
+    named = set_up.first_slip(sound.pairs, LIBRARY, [issue])
+    assert [(slip.applied.effect.name, slip.final) for slip in named] == [("unit", True)]
 
 
 def test_a_sound_run_has_no_slip_and_stays_as_it_is():

@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl.effects import inputs_of
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.compare.slips import OverrideTest
+from gcode2krl.gap.compare.slips import override_slip
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 
@@ -21,14 +21,14 @@ def _pair(percent, **signals):
 @pytest.mark.slow
 @pytest.mark.parametrize("signals", [{"tracker": False}, {"controller": False}])
 def test_the_override_is_found_by_joints_or_by_the_tip(signals):
-    (slip,) = OverrideTest().find([_pair(72, **signals)], LIBRARY)
+    (slip,) = override_slip([_pair(72, **signals)], LIBRARY)
     assert slip.applied["percent"] == pytest.approx(72.0, abs=0.2)
     assert slip.rms_after < 0.1 * slip.rms_before
     assert slip.words.startswith("the run was at 7")
 
 
 def test_a_small_difference_is_left_to_the_time_laws():
-    assert OverrideTest().find([_pair(97, tracker=False)], LIBRARY) == []
+    assert override_slip([_pair(97, tracker=False)], LIBRARY) == []
 
 
 def test_another_path_is_no_override():
@@ -43,10 +43,10 @@ def test_another_path_is_no_override():
         q_act_rad=table.q_act_rad[rows],
         segments=np.array([[0, rows.stop]]),
     )
-    assert OverrideTest().find([replace(pair, run=replace(pair.run, controller=shorter))], LIBRARY) == []
+    assert override_slip([replace(pair, run=replace(pair.run, controller=shorter))], LIBRARY) == []
 
 
 def test_a_log_alone_and_an_excluded_effect_show_none():
     pair = _pair(72, tracker=False)
-    assert OverrideTest().find([replace(pair, from_log=True)], LIBRARY) == []
-    assert OverrideTest().find([pair], {}) == []
+    assert override_slip([replace(pair, from_log=True)], LIBRARY) == []
+    assert override_slip([pair], {}) == []

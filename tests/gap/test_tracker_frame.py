@@ -8,7 +8,7 @@ import pytest
 from gcode2krl.effects import inputs_of
 from gcode2krl.effects.frame_effect import frame_of
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.posterior.set_up import TrackerFrameTest
+from gcode2krl.gap.posterior.set_up import tracker_frame_slip
 from tests.gap.synthetic import LIBRARY, TRUE_STEP_S, applied, prediction, runs
 
 
@@ -29,7 +29,7 @@ def _seen_from(pair, frame, stated="base"):
 
 def test_the_frame_is_found(pair):
     truth = applied("base_frame:x_mm=400,y_mm=-250,z_mm=30,a_deg=40,b_deg=3,c_deg=-5")[0]
-    (slip,) = TrackerFrameTest().find([_seen_from(pair, frame_of(truth))], LIBRARY)
+    (slip,) = tracker_frame_slip([_seen_from(pair, frame_of(truth))], LIBRARY)
     np.testing.assert_allclose(frame_of(slip.applied), frame_of(truth), atol=0.02)
     assert slip.rms_after < 1e-3 * slip.rms_before
     assert "shifted by 473 mm" in slip.words
@@ -37,10 +37,10 @@ def test_the_frame_is_found(pair):
 
 def test_what_a_robot_may_be_off_by_is_no_other_frame(pair):
     near = frame_of(applied("base_frame:x_mm=5,a_deg=0.5")[0])
-    assert TrackerFrameTest().find([_seen_from(pair, near)], LIBRARY) == []
+    assert tracker_frame_slip([_seen_from(pair, near)], LIBRARY) == []
 
 
 def test_a_frame_that_run_toml_states_is_none_of_base(pair):
     far = frame_of(applied("base_frame:x_mm=400")[0])
-    assert TrackerFrameTest().find([_seen_from(pair, far, "tcp")], LIBRARY) == []
-    assert TrackerFrameTest().find([_seen_from(pair, far)], {}) == []
+    assert tracker_frame_slip([_seen_from(pair, far, "tcp")], LIBRARY) == []
+    assert tracker_frame_slip([_seen_from(pair, far)], {}) == []

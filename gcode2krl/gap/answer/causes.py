@@ -51,10 +51,10 @@ from gcode2krl.gap.posterior.next_run import (
     CUT,
     MOTION,
     ONCE,
+    Answer,
     Apart,
     Bare,
     Choice,
-    Family,
     OpenPair,
     Parting,
     choose_next_run,
@@ -612,12 +612,11 @@ def next_run_of(
     depends_on: Sequence[tuple[DependsOnResult, Evidence | None]] = (),
 ) -> NextRun | None:
     """Return the run that parts best what is left open; None where nothing is."""
-    families = [
-        Family(
-            dependence.link, dependence.at, dependence.on, dependence.form, dependence.probability, evidence
-        )
-        for dependence, evidence in depends_on
-    ]
+    families: dict[str, list[Answer]] = {}
+    for dependence, evidence in depends_on:
+        label = f"{dependence.at}, {dependence.on}"
+        answer = Answer(label, dependence.probability, evidence=evidence)
+        families.setdefault(dependence.link, []).append(answer)
     choice = choose_next_run(context, judgements, families)
     return None if choice is None else told(choice)
 

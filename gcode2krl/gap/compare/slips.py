@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import log
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -211,17 +211,6 @@ class Slip:
     """Names and targets of the slips that it cannot be told from; None for a target that is not known."""
 
 
-class SlipTest(Protocol):
-    """A test for one kind of slip."""
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Return the names of the effects that it finds; one that the library lacks is not found."""
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the slip that all runs share; empty where nothing shows one."""
-
-
 def motion_traces(pairs: Sequence[Pair]) -> list[Trace]:
     """Return what shows how far the runs have come: their joints, or without any their tips."""
     joints = [trace for pair in pairs if (trace := PATH.motion(pair)) is not None]
@@ -288,38 +277,26 @@ def checked(pairs: Sequence[Pair]) -> list[Issue]:
     ]
 
 
-@dataclass(frozen=True)
-class CheckTest:
-    """A run that does not belong to its prediction, by its checks. Nothing is compared beyond it."""
-
-    issues: tuple[Issue, ...]
-    effects = tuple(dict.fromkeys(_EFFECT_OF.values()))
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the first error after which nothing can be compared, as a slip."""
-        for issue in self.issues:
-            effect = library.get(_EFFECT_OF.get(issue.code, ""))
-            if issue.severity == "error" and effect is not None:
-                file = issue.message.split(".")[0].split(":")[0]
-                target = file if file in effect.targets(pairs[0].inputs.cell) else None
-                return [final_slip(effect, target, issue.message, pairs)]
-        return []
+def check_slip(pairs: Sequence[Pair], library: Mapping[str, Effect], issues: Iterable[Issue]) -> list[Slip]:
+    """Return the first finding of the checks after which nothing can be compared, as a slip."""
+    for issue in issues:
+        effect = library.get(_EFFECT_OF.get(issue.code, ""))
+        if issue.severity == "error" and effect is not None:
+            file = issue.message.split(".")[0].split(":")[0]
+            target = file if file in effect.targets(pairs[0].inputs.cell) else None
+            return [final_slip(effect, target, issue.message, pairs)]
+    return []
 
 
 _CLOCK = "clock"
 
 
-class ClockTest:
-    """Large clock errors, which were taken off the stamps: one a table, whatever other slips there are."""
-
-    effects = (_CLOCK,)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the median offset of each table's clock, where it is not zero."""
-        effect = library.get(_CLOCK)
-        if effect is None:
-            return []
-        return [slip for link in (PATH, MECHANICS) if (slip := _clock_of(link, pairs, effect)) is not None]
+def clock_slips(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the median offset that was taken off each table's stamps, where it is not zero."""
+    effect = library.get(_CLOCK)
+    if effect is None:
+        return []
+    return [slip for link in (PATH, MECHANICS) if (slip := _clock_of(link, pairs, effect)) is not None]
 
 
 def _clock_of(link: Link, pairs: Sequence[Pair], effect: Effect) -> Slip | None:
@@ -349,24 +326,19 @@ _UNITS = {
 """How many of a unit a newton is."""
 
 
-class ForceUnitTest:
-    """Another unit of force, by the factor between measured and predicted forces."""
-
-    effects = (_FORCE_UNIT,)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the unit, where the forces are those of the prediction in it."""
-        traces, effect = FORCE.traces(pairs), library.get(_FORCE_UNIT)
-        if effect is None or not any(trace.nominal.any() for trace in traces):
-            return []
-        power = sum(float(np.sum(trace.nominal**2)) for trace in traces)
-        factor = max(sum(float(np.sum(trace.nominal * trace.measured)) for trace in traces) / power, 1e-12)
-        unit = min(_UNITS, key=lambda known: abs(log(factor / known)))
-        if abs(log(factor / unit)) > THRESHOLDS.slips.force_unit_log:
-            return []
-        applied = Applied(effect, "force", {"factor": unit})
-        words = f"force.csv is {unit:g} times the predicted force: {_UNITS[unit]} in place of newtons"
-        return slip_if_explained(traces, applied, rms_left(traces, applied), words)
+def force_unit_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the unit of force, where the measured forces are those of the prediction in it."""
+    traces, effect = FORCE.traces(pairs), library.get(_FORCE_UNIT)
+    if effect is None or not any(trace.nominal.any() for trace in traces):
+        return []
+    power = sum(float(np.sum(trace.nominal**2)) for trace in traces)
+    factor = max(sum(float(np.sum(trace.nominal * trace.measured)) for trace in traces) / power, 1e-12)
+    unit = min(_UNITS, key=lambda known: abs(log(factor / known)))
+    if abs(log(factor / unit)) > THRESHOLDS.slips.force_unit_log:
+        return []
+    applied = Applied(effect, "force", {"factor": unit})
+    words = f"force.csv is {unit:g} times the predicted force: {_UNITS[unit]} in place of newtons"
+    return slip_if_explained(traces, applied, rms_left(traces, applied), words)
 
 
 _LIMITS = THRESHOLDS.slips
@@ -419,30 +391,25 @@ def _is_nearer(pair: Pair, in_air: Pair) -> bool:
 _OVERRIDE = "override"
 
 
-class OverrideTest:
-    """Another override: its estimate by the duration is refined by simulating the motion again."""
-
-    effects = (_OVERRIDE,)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the override, where it is not that of the prediction."""
-        effect = library.get(_OVERRIDE)
-        if effect is None or any(pair.from_log for pair in pairs):
-            return []
-        percents = [percent for pair in pairs if (percent := _percent(pair)) is not None]
-        if not percents or abs(float(np.median(percents)) - 100.0) < _LIMITS.override_off_percent:
-            return []
-        traces = motion_traces(pairs)
-        if not traces:
-            return []
-        percent = float(np.median(percents))
-        tried = percent * np.array(_LIMITS.override_first_tries)
-        best, after = best_of(traces, [Applied(effect, None, {"percent": float(each)}) for each in tried])
-        for width in _LIMITS.override_widths:
-            around = best.values["percent"] * (1.0 + width * np.array([-0.5, 0.0, 0.5, -1.0, 1.0]))
-            best, after = best_of(traces, [replace(best, values={"percent": float(each)}) for each in around])
-        words = f"the run was at {best.values['percent']:.1f} % override"
-        return slip_if_explained(traces, best, after, words)
+def override_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return another override: the estimate by the duration, refined by simulating the motion again."""
+    effect = library.get(_OVERRIDE)
+    if effect is None or any(pair.from_log for pair in pairs):
+        return []
+    percents = [percent for pair in pairs if (percent := _percent(pair)) is not None]
+    if not percents or abs(float(np.median(percents)) - 100.0) < _LIMITS.override_off_percent:
+        return []
+    traces = motion_traces(pairs)
+    if not traces:
+        return []
+    percent = float(np.median(percents))
+    tried = percent * np.array(_LIMITS.override_first_tries)
+    best, after = best_of(traces, [Applied(effect, None, {"percent": float(each)}) for each in tried])
+    for width in _LIMITS.override_widths:
+        around = best.values["percent"] * (1.0 + width * np.array([-0.5, 0.0, 0.5, -1.0, 1.0]))
+        best, after = best_of(traces, [replace(best, values={"percent": float(each)}) for each in around])
+    words = f"the run was at {best.values['percent']:.1f} % override"
+    return slip_if_explained(traces, best, after, words)
 
 
 def _percent(pair: Pair) -> float | None:
@@ -697,16 +664,11 @@ def _steady(steps_mm: Floats, inputs: Inputs) -> Iterator[tuple[int, int]]:
 _OTHER_PROGRAM = "other_program"
 
 
-class ProgramTest:
-    """Another program than the predicted one. Nothing is compared beyond it."""
-
-    effects = (_OTHER_PROGRAM,)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the slip where a commanded path shows another program."""
-        effect = library.get(_OTHER_PROGRAM)
-        words = other_program(pairs) if effect is not None else None
-        return [] if effect is None or words is None else [final_slip(effect, None, words, pairs)]
+def program_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return the slip where a commanded path shows another program. Nothing is compared beyond it."""
+    effect = library.get(_OTHER_PROGRAM)
+    words = other_program(pairs) if effect is not None else None
+    return [] if effect is None or words is None else [final_slip(effect, None, words, pairs)]
 
 
 def other_program(pairs: Sequence[Pair]) -> str | None:

@@ -21,9 +21,10 @@ With a distance of d the odds between them after the run are about exp(d²/2).
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -429,23 +430,6 @@ class OpenPair:
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
-    """A family that the rest of a link depends on, and its probability."""
-
-    link: str
-    at: str
-    on: str
-    form: str
-    probability: float
-    evidence: Evidence | None = None
-
-    @property
-    def label(self) -> str:
-        """Return its words, ``A2, reversals``."""
-        return f"{self.at}, {self.on}"
-
-
-@dataclass(frozen=True, eq=False)
 class Parting:
     """A pair with what a program makes of it."""
 
@@ -482,9 +466,11 @@ class Choice:
 
 
 def choose_next_run(
-    context: Context, judgements: Sequence[Judgement], families: Sequence[Family] = ()
+    context: Context,
+    judgements: Sequence[Judgement],
+    families: Mapping[str, Sequence[Answer]] = MappingProxyType({}),
 ) -> Choice | None:
-    """Return the program with the best expected odds between what is left open.
+    """Return the program with the best expected odds between what is left open; ``families`` by link.
 
     None where nothing is left open, or where robot and cell are not known well enough for a program.
     """
@@ -570,16 +556,15 @@ def _worth(choice: Choice) -> float:
 # What is left open
 
 
-def open_pairs(judgements: Sequence[Judgement], families: Sequence[Family] = ()) -> Iterator[OpenPair]:
-    """Yield the pairs of answers that each link with a gap leaves open."""
+def open_pairs(
+    judgements: Sequence[Judgement], families: Mapping[str, Sequence[Answer]] = MappingProxyType({})
+) -> Iterator[OpenPair]:
+    """Yield the pairs of answers that each link with a gap leaves open; ``families`` by the link's name."""
     for judgement in judgements:
         if judgement.verdict == "no_gap":
             continue
-        of_link = [
-            Answer(family.label, family.probability, evidence=family.evidence)
-            for family in families
-            if family.link == judgement.link.name and family.probability >= _LIMITS.least_open
-        ]
+        of_link = families.get(judgement.link.name, ())
+        of_link = [family for family in of_link if family.probability >= _LIMITS.least_open]
         likely = [cause for cause in judgement.causes if cause.probability >= _LIMITS.least_open]
         for cause in likely:
             yield from _pairs_of(cause, judgement, of_link)

@@ -6,7 +6,7 @@ of tool or base, whose commanded joints belong to another frame, or a tracker th
 frame than ``$BASE``.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,16 +23,15 @@ from gcode2krl.gap.compare.links import MECHANICS, PATH
 from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.slips import (
     Alike,
-    CheckTest,
-    ClockTest,
-    ForceUnitTest,
-    OverrideTest,
-    ProgramTest,
     Slip,
-    SlipTest,
     best_of,
+    check_slip,
     checked,
+    clock_slips,
+    force_unit_slip,
     on_the_curve,
+    override_slip,
+    program_slip,
     rms_before,
     rms_left,
     slip_if_explained,
@@ -51,28 +50,23 @@ _TOOL, _BASE = "tool_number", "base_number"
 _LIMITS = THRESHOLDS.slips
 
 
-class FrameTest:
-    """Another tool of the cell, or another base, which is fitted: whichever leaves less."""
-
-    effects = (_TOOL, _BASE)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the frame that puts the commanded paths where they were programmed."""
-        traces = PATH.traces(pairs)
-        if not traces or rms_before(traces) < _LIMITS.path_off_rad:
-            return []
-        candidates = list(_candidates(pairs, library))
-        if not candidates:
-            return []
-        best, after = best_of(traces, candidates)
-        if best.effect.name == _BASE:
-            best = _refined(traces, best)
-            after = rms_left(traces, best)
-        if not all(_brings_back(pair, best) for pair in pairs):
-            return []
-        what = f"tool {best.target}" if best.effect.name == _TOOL else "base another one"
-        slips = slip_if_explained(traces, best, after, f"the commanded joints are those of {what}")
-        return [replace(slip, alike=_alike(best, pairs)) for slip in slips]
+def frame_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return another tool, or the base that fits, whose commanded paths are where they were programmed."""
+    traces = PATH.traces(pairs)
+    if not traces or rms_before(traces) < _LIMITS.path_off_rad:
+        return []
+    candidates = list(_candidates(pairs, library))
+    if not candidates:
+        return []
+    best, after = best_of(traces, candidates)
+    if best.effect.name == _BASE:
+        best = _refined(traces, best)
+        after = rms_left(traces, best)
+    if not all(_brings_back(pair, best) for pair in pairs):
+        return []
+    what = f"tool {best.target}" if best.effect.name == _TOOL else "base another one"
+    slips = slip_if_explained(traces, best, after, f"the commanded joints are those of {what}")
+    return [replace(slip, alike=_alike(best, pairs)) for slip in slips]
 
 
 def frame_values(shift_mm: Floats, rotation: Floats) -> dict[str, float]:
@@ -153,35 +147,28 @@ def _alike(frame: Applied, pairs: Sequence[Pair]) -> Alike:
 _TRACKER_FRAME = "base_frame"
 
 
-class TrackerFrameTest:
-    """Another frame of the tracker, far from ``$BASE`` (Kabsch 1976)."""
-
-    effects = (_TRACKER_FRAME,)
-
-    def find(self, pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
-        """Return the frame that puts the tracked tips onto the predicted ones."""
-        traces = [
-            trace for trace in MECHANICS.traces(pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
-        ]
-        effect = library.get(_TRACKER_FRAME)
-        if effect is None or not traces or rms_before(traces) < THRESHOLDS.slips.tracker_off_mm:
-            return []
-        predicted_mm = np.concatenate([trace.nominal for trace in traces])
-        measured_mm = np.concatenate([trace.measured for trace in traces])
-        rotation, shift_mm = rotation_between(predicted_mm, measured_mm)
-        frame = Applied(effect, None, frame_values(shift_mm, rotation))
-        words = (
-            f"the tracker is in another frame: $BASE shifted by {np.linalg.norm(shift_mm):.0f} mm and turned"
-        )
-        return slip_if_explained(traces, frame, rms_left(traces, frame), words)
+def tracker_frame_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
+    """Return another frame of the tracker, by which its tips are the predicted ones (Kabsch 1976)."""
+    traces = [
+        trace for trace in MECHANICS.traces(pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
+    ]
+    effect = library.get(_TRACKER_FRAME)
+    if effect is None or not traces or rms_before(traces) < THRESHOLDS.slips.tracker_off_mm:
+        return []
+    predicted_mm = np.concatenate([trace.nominal for trace in traces])
+    measured_mm = np.concatenate([trace.measured for trace in traces])
+    rotation, shift_mm = rotation_between(predicted_mm, measured_mm)
+    frame = Applied(effect, None, frame_values(shift_mm, rotation))
+    words = f"the tracker is in another frame: $BASE shifted by {np.linalg.norm(shift_mm):.0f} mm and turned"
+    return slip_if_explained(traces, frame, rms_left(traces, frame), words)
 
 
-TESTS: tuple[SlipTest, ...] = (
-    ProgramTest(),  # before the override: none explains another program. Ends the diagnosis
-    OverrideTest(),  # before frames, which need the same times
-    FrameTest(),
-    TrackerFrameTest(),  # behind the joints: the tip follows them
-    ForceUnitTest(),
+TESTS: tuple[Callable[[Sequence[Pair], Mapping[str, Effect]], list[Slip]], ...] = (
+    program_slip,  # before the override: none explains another program. Ends the diagnosis
+    override_slip,  # before frames, which need the same times
+    frame_slip,
+    tracker_frame_slip,  # behind the joints: the tip follows them
+    force_unit_slip,
 )
 """The first that finds a slip is the only one; behind them come the checks of the runs, which end it too."""
 
@@ -212,7 +199,7 @@ def examine_set_up(context: Context) -> SetUp:
     context = context.with_pairs(pairs)
     issues = [*in_air, *checked(context.pairs)]
     slips = first_slip(context.pairs, context.offered, issues)
-    clocks = ClockTest().find(context.pairs, context.offered)
+    clocks = clock_slips(context.pairs, context.offered)
     if not any(slip.final for slip in slips):
         for slip in slips:
             context = context.with_slip(slip.applied)
@@ -223,5 +210,5 @@ def first_slip(
     pairs: Sequence[Pair], library: Mapping[str, Effect], issues: Sequence[Issue] = ()
 ) -> list[Slip]:
     """Return what the first test finds that finds anything; ``issues`` are those of the runs' checks."""
-    tests = (*TESTS, CheckTest(tuple(issues)))
-    return next((slips for test in tests if (slips := test.find(pairs, library))), [])
+    named = (slips for test in TESTS if (slips := test(pairs, library)))
+    return next(named, None) or check_slip(pairs, library, issues)
