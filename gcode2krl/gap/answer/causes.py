@@ -31,7 +31,7 @@ from gcode2krl.gap.answer.result import (
     Unexplained,
     UnknownAt,
 )
-from gcode2krl.gap.answer.words import listed, number
+from gcode2krl.gap.answer.words import AXES, FORCE_AXES, listed, number
 from gcode2krl.gap.compare.events import line_at
 from gcode2krl.gap.compare.inputs import Admissible
 from gcode2krl.gap.compare.interpolation import nearest_rows, step_of
@@ -161,7 +161,6 @@ def _slip_intervals(slip: Slip) -> dict[str, Interval]:
 _LIMITS = THRESHOLDS.tell
 _IN_EACH_RUN = frozenset({Dependence.RUN_TIME})
 """Each run has a course of its own."""
-_AXES = ("x", "y", "z")
 
 _Input = tuple[str, str, Floats]
 """Name, unit and values (n,)."""
@@ -252,7 +251,7 @@ def _of_joint(inputs: Admissible, on: Dependence, joint: int) -> _Input | None:
 
 def _along(name: str, unit: str, vectors: Floats) -> list[_Input]:
     """Return the components of vectors (n, 3) in ``$BASE``."""
-    return [(f"{name} along {axis}", unit, vectors[:, i]) for i, axis in enumerate(_AXES)]
+    return [(f"{name} along {axis}", unit, vectors[:, i]) for i, axis in enumerate(AXES)]
 
 
 _FAMILY_LIMITS = THRESHOLDS.families
@@ -268,7 +267,6 @@ _FORMS = {
     Dependence.REVERSALS: "loop",
 }
 """What a function of these looks like; of all others it is smooth."""
-_FORCE_AXES = ("fx", "fy", "fz")
 _TIP = "tip"
 
 
@@ -338,7 +336,7 @@ def _in_base(trace: Trace, values: Floats) -> Floats:
 def _at(evidence: Evidence, signals: tuple[Floats, ...]) -> str:
     """Return the place as the answer names it: of a force the axis that has most of it."""
     if evidence.place.where is Where.FORCE_AXIS:
-        return _FORCE_AXES[int(np.argmax(np.sum(np.concatenate(signals) ** 2, axis=0)))]
+        return FORCE_AXES[int(np.argmax(np.sum(np.concatenate(signals) ** 2, axis=0)))]
     if evidence.place.where is Where.JOINT and evidence.place.joint is None:
         return _TIP  # it is late along the path
     return evidence.place.name

@@ -29,7 +29,7 @@ from gcode2krl.gap.posterior.judgement import Judgement
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.tell
-_AXES = ("x", "y", "z")
+AXES, FORCE_AXES = ("x", "y", "z"), ("fx", "fy", "fz")
 _UNITS = {
     name: name
     for name in ("mm", "deg", "rad", "mrad", "N", "Nm", "kNm", "kg", "s", "ms", "h", "m", "cm", "K")
@@ -43,7 +43,6 @@ _TARGETS = {
     "q_load": "the load encoders",
     "all": "all axes",
 }
-_FORCE_AXES = ("fx", "fy", "fz")
 _EVENTS = {
     "impulse": "an impulse of {size} in {link}",
     "slip": "a slip of {size} in {link}, which stays",
@@ -149,7 +148,7 @@ def _numbers(parameters: Mapping[str, Interval]) -> list[str]:
 def _vector(names: Sequence[str]) -> list[str]:
     """Return the three components of a direction, where the first names are one."""
     head = list(names[:3])
-    is_direction = [name.rpartition("_")[2] for name in head] == list(_AXES) and head[0].startswith(
+    is_direction = [name.rpartition("_")[2] for name in head] == list(AXES) and head[0].startswith(
         "direction"
     )
     return head if is_direction else []
@@ -213,7 +212,7 @@ def _course(dependence: DependsOnResult) -> list[str]:
 
 def _place(dependence: DependsOnResult) -> str:
     """Return the place; the direction says more than the axis of a force."""
-    return "force" if dependence.at in _FORCE_AXES else dependence.at
+    return "force" if dependence.at in FORCE_AXES else dependence.at
 
 
 def _form(dependence: DependsOnResult) -> str:

@@ -416,34 +416,25 @@ def _percent(pair: Pair) -> float | None:
     """Return 100 times predicted over measured time in motion; None where paths differ in length."""
     controller, tracker = pair.run.controller, pair.run.tracker
     if controller is not None and controller.path_rad is not None and np.isfinite(controller.path_rad).all():
-        measured = _in_motion(controller.time_s, controller.path_rad, _LIMITS.still_rad_s)
-        predicted = _in_motion(pair.inputs.time_s, pair.inputs.q_cmd_rad, _LIMITS.still_rad_s)
+        measured_s, way = _in_motion(controller.time_s, controller.path_rad, _LIMITS.still_rad_s)
+        predicted_s, planned = _in_motion(pair.inputs.time_s, pair.inputs.q_cmd_rad, _LIMITS.still_rad_s)
     elif tracker is not None:
-        measured = _in_motion(tracker.time_s, tracker.position_mm, _LIMITS.still_mm_s)
-        predicted = _in_motion(pair.inputs.time_s, pair.inputs.position_mm, _LIMITS.still_mm_s)
+        measured_s, way = _in_motion(tracker.time_s, tracker.position_mm, _LIMITS.still_mm_s)
+        predicted_s, planned = _in_motion(pair.inputs.time_s, pair.inputs.position_mm, _LIMITS.still_mm_s)
     else:
         return None
-    if measured.seconds <= 0.0 or predicted.seconds <= 0.0:
+    if measured_s <= 0.0 or predicted_s <= 0.0 or abs(way / planned - 1.0) > _LIMITS.override_same_length:
         return None
-    if abs(measured.way / predicted.way - 1.0) > _LIMITS.override_same_length:
-        return None
-    return 100.0 * predicted.seconds / measured.seconds
+    return 100.0 * predicted_s / measured_s
 
 
-class _InMotion(NamedTuple):
-    """For how long a signal moves, and how far in its own unit."""
-
-    seconds: float
-    way: float
-
-
-def _in_motion(time_s: Floats, values: Floats, still: float) -> _InMotion:
-    """Return for how long values (n, k) move faster than ``still`` a second, and how far."""
+def _in_motion(time_s: Floats, values: Floats, still: float) -> tuple[float, float]:
+    """Return for how long values (n, k) move faster than ``still`` a second, and how far in their unit."""
     every = max(1, round(_LIMITS.motion_step_s / usual_step_s(time_s)))
     way = np.linalg.norm(np.diff(values[::every], axis=0), axis=1)
     step_s = np.diff(time_s[::every])
     moves = way > still * step_s
-    return _InMotion(float(step_s[moves].sum()), float(way[moves].sum()))
+    return float(step_s[moves].sum()), float(way[moves].sum())
 
 
 _STOPS = "advance_stop"
@@ -585,14 +576,6 @@ def _rms(traces: Sequence[Trace]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([trace.residual.ravel() ** 2 for trace in traces]))))
 
 
-@dataclass(frozen=True)
-class _Ratio:
-    """Measured over predicted speed on a stretch at the programmed speed."""
-
-    value: float
-    rapid: bool
-
-
 def other_feeds(paths: Sequence[CommandedPath]) -> str | None:
     """Return what shows that feeds are not the predicted ones, as a sentence; None where nothing does.
 
@@ -600,8 +583,8 @@ def other_feeds(paths: Sequence[CommandedPath]) -> str | None:
     at a smaller share than feeds show nothing: T1 and the limits of the axes slow them down.
     """
     ratios = [ratio for path in paths for ratio in _ratios(path)]
-    rapid = np.array([ratio.value for ratio in ratios if ratio.rapid])
-    feed = np.array([ratio.value for ratio in ratios if not ratio.rapid])
+    rapid = np.array([ratio for ratio, is_rapid in ratios if is_rapid])
+    feed = np.array([ratio for ratio, is_rapid in ratios if not is_rapid])
     if len(rapid) == 0 or len(feed) == 0:
         return None
     of_feed, of_rapid = float(np.median(feed)), float(np.median(rapid))
@@ -616,8 +599,11 @@ def other_feeds(paths: Sequence[CommandedPath]) -> str | None:
     )
 
 
-def _ratios(path: CommandedPath) -> Iterator[_Ratio]:
-    """Yield the ratio of speeds on each stretch of constant predicted speed, where the curve is the same."""
+def _ratios(path: CommandedPath) -> Iterator[tuple[float, bool]]:
+    """Yield measured over predicted speed on each stretch at the programmed speed, and whether it is rapid.
+
+    Where the curve is the same.
+    """
     inputs = path.inputs
     steps = np.linalg.norm(np.diff(inputs.position_mm, axis=0), axis=1)
     planned_mm = np.concatenate([[0.0], np.cumsum(steps)])
@@ -637,7 +623,7 @@ def _ratios(path: CommandedPath) -> Iterator[_Ratio]:
         here_s = np.diff(np.interp(at_mm, gone_mm, path.time_s))
         if (here_s > 0.0).all() and abs(here_s[0] / here_s[1] - 1.0) < _LIMITS.feed_constant:
             rapid = bool(inputs.toolpath.rapid[inputs.move[end]])
-            yield _Ratio(float(there_s.sum() / here_s.sum()), rapid)
+            yield float(there_s.sum() / here_s.sum()), rapid
 
 
 def _steady(steps_mm: Floats, inputs: Inputs) -> Iterator[tuple[int, int]]:
