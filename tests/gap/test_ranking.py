@@ -33,7 +33,7 @@ def scores_of(found):
 
 
 def names(found, scores):
-    return [found.data.candidates.block(score.column).effect.name for score in scores]
+    return [score.column.block.effect.name for score in scores]
 
 
 def test_surprising_ones_come_the_largest_gain_first():

@@ -1,5 +1,7 @@
 """Surprise against SciPy's chi-square, thresholds by counting false alarms, scores against least squares."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import optimize, special, stats
@@ -67,13 +69,18 @@ def test_the_statistic_of_white_noise_is_chi_square():
     gains = []
     for seed in range(200):
         made = gram(trace(noise(COUNT, seed)), signatures)
-        gains.append(scores(made, [Column(0, 1, 2, *(np.repeat(b, 2) for b in FREE))])[0].gain)
+        gains.append(scores(made, [Column(block(), 1, 2, *(np.repeat(b, 2) for b in FREE))])[0].gain)
     assert stats.kstest(gains, "chi2", args=(2,)).pvalue > 1e-3
 
 
-def scored(y, signatures, **column):
+def block(bent=False):
+    """Return the block of an effect that is proportional to its size, or is not."""
+    return SimpleNamespace(effect=SimpleNamespace(is_linear=not bent))
+
+
+def scored(y, signatures, bent=False, **column):
     made = gram(trace(y[:, None]), signatures)
-    given = {"block": 0, "first": 0, "width": 1, "low": FREE[0], "high": FREE[1]} | column
+    given = {"block": block(bent), "first": 0, "width": 1, "low": FREE[0], "high": FREE[1]} | column
     return scores(made, [Column(**given)])[0]
 
 

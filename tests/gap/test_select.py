@@ -12,6 +12,8 @@ from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.posterior.selection import scores, surprise, threshold
 
 COUNT, BLOCKS, STRETCHES = 2400, 25, 48
+STRAIGHT = SimpleNamespace(effect=SimpleNamespace(is_linear=True))
+"""Block of an effect that is proportional to its size."""
 
 
 def _view(
@@ -37,7 +39,7 @@ def _view(
 
 
 def _columns() -> list[Column]:
-    return [Column(i, i, 1, np.array([-np.inf]), np.array([np.inf])) for i in range(BLOCKS)]
+    return [Column(STRAIGHT, i, 1, np.array([-np.inf]), np.array([np.inf])) for i in range(BLOCKS)]
 
 
 def _largest(view: SignatureGram, y: np.ndarray, inflated: bool = False) -> float:

@@ -92,7 +92,7 @@ def test_more_than_the_plausible_range_is_not_this_effect():
 def test_what_cannot_be_simulated_is_no_candidate():
     made = examined([run(4, small=2.0)], [Impossible("impossible", SMALL.form), SMALL], SIGMA)
     assert found(made) == ["wave_2"]
-    assert [block.effect.name for block in made.data.candidates.blocks] == ["wave_2"]
+    assert [column.block.effect.name for column in made.data.candidates.columns] == ["wave_2"]
 
 
 def test_a_form_with_its_own_sign_here_and_there_is_no_effect():

@@ -251,17 +251,18 @@ def _width(nuisance: Nuisance) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Where a candidate's columns stand among the signatures, and the range of its coefficients."""
+    """A candidate: where its columns stand among the signatures, and the range of its coefficients."""
 
-    block: int
+    block: Block
     first: int
     width: int
     low: Floats
     high: Floats
-    bent: bool = False
-    """The signals are not proportional to the size: coefficients tell little of it."""
-    tried: float = 1.0
-    """Of the block: out of so many it was chosen by looking at the data."""
+
+    @property
+    def bent(self) -> bool:
+        """Tell whether signals are not proportional to the size: coefficients then tell little of it."""
+        return not self.block.effect.is_linear
 
     @property
     def index(self) -> Ints:
@@ -273,7 +274,6 @@ class Column:
 class Candidates:
     """The effects that are possible in some traces."""
 
-    blocks: tuple[Block, ...]
     columns: tuple[Column, ...]
     signatures: tuple[Floats, ...]
     """(k, n, s) of each trace."""
@@ -281,26 +281,16 @@ class Candidates:
     @classmethod
     def of(cls, blocks: Sequence[Block], traces: Sequence[Trace], known: Signatures) -> "Candidates":
         """Return the blocks that do something in at least one trace and are possible in all."""
-        kept: list[Block] = []
         columns: list[Column] = []
         first = 0
         for block in blocks:
             signatures = [known.columns(block, trace) for trace in traces]
-            if not _is_possible(signatures):
-                continue
-            width = signatures[0].shape[2]
-            low, high = block.bounds(traces[0])
-            columns.append(
-                Column(len(kept), first, width, low, high, not block.effect.is_linear, block.tried)
-            )
-            kept.append(block)
-            first += width
-        stacked = tuple(known.stacked(kept, trace) for trace in traces)
-        return cls(tuple(kept), tuple(columns), stacked)
-
-    def block(self, column: Column) -> Block:
-        """Return the block whose columns these are."""
-        return self.blocks[column.block]
+            if _is_possible(signatures):
+                width = signatures[0].shape[2]
+                columns.append(Column(block, first, width, *block.bounds(traces[0])))
+                first += width
+        kept = [column.block for column in columns]
+        return cls(tuple(columns), tuple(known.stacked(kept, trace) for trace in traces))
 
 
 def _is_possible(signatures: Sequence[Floats]) -> bool:

@@ -72,7 +72,7 @@ def constancy_of(examination: Examination, number: int) -> Constancy | None:
         return None
     spreads = [_spread(groups) for groups in divisions]
     worst = min(spreads, key=lambda each: each.p)
-    return Constancy(inconstancy=worst.inconstancy, p=min(1.0, len(spreads) * worst.p))
+    return replace(worst, p=min(1.0, len(spreads) * worst.p))
 
 
 def spread_between_runs(examination: Examination, number: int) -> tuple[float, int]:
@@ -192,12 +192,7 @@ def _halves(residual: _Residual, run: int) -> list[Part]:
 # Spread
 
 
-class _Spread(NamedTuple):
-    inconstancy: float
-    p: float
-
-
-def _spread(groups: Sequence[Sequence[Part]]) -> _Spread:
+def _spread(groups: Sequence[Sequence[Part]]) -> Constancy:
     """Return the spread within groups beyond the variances (DerSimonian & Laird 1986), and its p."""
     chi2 = freedom = weight = 0.0
     for group in groups:
@@ -209,7 +204,8 @@ def _spread(groups: Sequence[Sequence[Part]]) -> _Spread:
         freedom += len(group) - 1
         weight += float(weights.sum() - weights @ weights / weights.sum())
     variance = max(0.0, chi2 - freedom) / weight if weight > 0.0 else 0.0
-    return _Spread(variance**0.5, float(stats.chi2.sf(chi2, freedom)) if freedom else 1.0)
+    p = float(stats.chi2.sf(chi2, freedom)) if freedom else 1.0
+    return Constancy(inconstancy=variance**0.5, p=p)
 
 
 _DRAWS = 400

@@ -47,7 +47,7 @@ from gcode2krl.gap.noise.short import Noise
 from gcode2krl.gap.noise.source import strongest_moments
 from gcode2krl.gap.posterior.gram import Gram, SignatureGram
 from gcode2krl.gap.posterior.least_squares import Fitted, Numbers, Shortened, gauss_newton
-from gcode2krl.gap.posterior.likelihood import Likelihood, once_among
+from gcode2krl.gap.posterior.likelihood import Key, Likelihood, once_among
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
@@ -467,9 +467,6 @@ def _blocks(
     yield from blocks_at(effect, target, peaks, (p.high - p.low) * duration_s)
 
 
-Key = tuple[str, str | None]
-"""Name and target of an effect."""
-
 _ACTS = 1e-6
 """Smaller shares of the largest change are rounding errors of a simulation."""
 
@@ -500,7 +497,8 @@ class LinkData:
         """Return the data with their likelihood under a model of the noise."""
         likelihood = Likelihood(traces, nuisance, noise)
         signatures = likelihood.gram(candidates.signatures)
-        bounded = {block.key for block in candidates.blocks if block.effect.usual(question.mismatch, 1.0)}
+        blocks = [column.block for column in candidates.columns]
+        bounded = {block.key for block in blocks if block.effect.usual(question.mismatch, 1.0)}
         once = once_among(likelihood.design, candidates, signatures, bounded)
         likelihood = likelihood.counting(once)
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
@@ -679,9 +677,9 @@ def observable(examination: Examination) -> list[dict[str, Any]]:
     """
     smallest: dict[Key, dict[str, Any]] = {}
     needed = max(2.0 * examination.first_level, _LIMITS.least_ratio**2 * examination.data.times)
-    candidates = examination.data.candidates
-    for column, (share, power) in zip(candidates.columns, examination.observable, strict=False):
-        block = candidates.block(column)
+    columns = examination.data.candidates.columns
+    for column, (share, power) in zip(columns, examination.observable, strict=False):
+        block = column.block
         name = _only_size(block)
         if column.width != 1 or name is None or power <= 0.0:
             continue

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -80,16 +79,6 @@ def derivative(
     return np.ascontiguousarray(columns)
 
 
-class StepControl(Protocol):
-    """Which steps a linearisation offers."""
-
-    def trials(self, jacobian: Floats, r: Floats, x: Floats) -> Iterator[Floats]:
-        """Yield points to try, the boldest first; one that does not lower chi2 is followed by the next."""
-
-    def accept(self) -> None:
-        """Take notice that the last point was accepted."""
-
-
 class Damped:
     """Damped steps (Marquardt 1963), numbers at a bound left there where they would go beyond."""
 
@@ -97,7 +86,7 @@ class Damped:
         self.box, self.damping = box, _FIRST_DAMPING
 
     def trials(self, jacobian: Floats, r: Floats, x: Floats) -> Iterator[Floats]:
-        """Yield points, each further damped."""
+        """Yield points to try, the boldest first, each further damped."""
         for _ in range(_DAMPINGS):
             yield self.box.clipped(x + self._step(jacobian, r, x))
             self.damping *= 10.0
@@ -158,7 +147,7 @@ def gauss_newton(
     function: Function,
     x: Floats,
     box: Box,
-    control: StepControl,
+    control: Damped | Shortened,
     settled: Callable[[float, float], bool],
     *,
     most_steps: int,

@@ -62,7 +62,7 @@ _LEFT = 1e-6
 class CountedOnce:
     """Which nuisance of a design gives way to which effects."""
 
-    design: "NuisanceDesign"
+    design: NuisanceDesign
     alike: Mapping[Key, Bools] = field(default_factory=dict)
     """Effect -> which coefficients (m,) are of the form of its signature."""
     together: Mapping[Key, Floats] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class CountedOnce:
     def gone(self, applied: Applied) -> Bools:
         """Return which coefficients (m,) are of the form of an effect."""
         none = np.zeros(self.design.width, dtype=np.bool_)
-        return self._own(applied) | self.alike.get(_key(applied), none)
+        return self._own(applied) | self.alike.get(applied.key, none)
 
     def kept(self, applied: Iterable[Applied], clocks: bool = False) -> Floats | None:
         """Return the projection (m, m) of b onto what is left of it beside effects; None where all is.
@@ -91,25 +91,25 @@ class CountedOnce:
         for effect in applied if self._possible else ():
             if effect.effect.is_clock or not clocks:
                 gone |= self.gone(effect)
-            if not clocks and _key(effect) in self.together:
-                together.append(self.together[_key(effect)])
+            if not clocks and effect.key in self.together:
+                together.append(self.together[effect.key])
         if not gone.any() and not together:
             return None
         return _beside(self._projection(gone), together)
 
     def allowed_sizes(self, applied: Applied) -> float:
         """Return the size of an effect, in typical ones, that usual sizes of others together may make."""
-        return self.allowed.get(_key(applied), 0.0)
+        return self.allowed.get(applied.key, 0.0)
 
     def _own(self, applied: Applied) -> Bools:
         """Return which coefficients (m,) are the usual size of an effect at its own target and counts."""
         names = {p.name for p in applied.effect.parameters if p.role is Role.COUNT}
-        return self.own_of(_key(applied), {name: applied[name] for name in names})
+        return self.own_of(applied.key, {name: applied[name] for name in names})
 
     def own_of(self, key: Key, counts: Mapping[str, float] = NO_COUNTS) -> Bools:
         """Return which coefficients (m,) are the usual size of an effect at its target, of some counts."""
 
-        def is_own(item: "Nuisance") -> bool:
+        def is_own(item: Nuisance) -> bool:
             block = item.block
             return (
                 block is not None
@@ -124,7 +124,7 @@ class CountedOnce:
         """(m,) all but what an effect does beyond the first order of its size."""
         return ~self._where(lambda item: item.bent)
 
-    def _where(self, asked: "Callable[[Nuisance], bool]") -> Bools:
+    def _where(self, asked: Callable[[Nuisance], bool]) -> Bools:
         """Return which coefficients (m,) are of nuisance of which something is true."""
         where = np.zeros(self.design.width, dtype=np.bool_)
         for items, places in zip(self.design.nuisance, self.design.places, strict=True):
@@ -141,10 +141,6 @@ class CountedOnce:
         return projection
 
 
-def _key(applied: Applied) -> Key:
-    return applied.effect.name, applied.target
-
-
 def _beside(projection: Floats, together: list[Floats]) -> Floats:
     """Return a projection (m, m) less what it leaves of some directions (m, d)."""
     remaining = [projection @ directions for directions in together]
@@ -157,9 +153,9 @@ def _beside(projection: Floats, together: list[Floats]) -> Floats:
 
 
 def once_among(
-    design: "NuisanceDesign",
-    candidates: "Candidates",
-    signatures: "SignatureGram",
+    design: NuisanceDesign,
+    candidates: Candidates,
+    signatures: SignatureGram,
     bounded: Collection[Key] = (),
 ) -> CountedOnce:
     """Return which nuisance has the form of which candidates: what these span of it.
@@ -172,7 +168,7 @@ def once_among(
     together: dict[Key, Floats] = {}
     allowed: dict[Key, float] = {}
     for column in candidates.columns:
-        block = candidates.block(column)
+        block = column.block
         alike[block.key] = alike.get(block.key, False) | _spanned(column.index, signatures, design)
         if column.width and block.key in bounded and block.key not in together:
             others = once.straight & ~once.own_of(block.key)
@@ -182,7 +178,7 @@ def once_among(
     return CountedOnce(design, {key: mask for key, mask in alike.items() if mask.any()}, together, allowed)
 
 
-def _spanned(index: np.ndarray, signatures: "SignatureGram", design: "NuisanceDesign") -> Bools:
+def _spanned(index: np.ndarray, signatures: SignatureGram, design: NuisanceDesign) -> Bools:
     """Return which coefficients (m,) of the runs' own nuisance some signatures span in every run."""
     share = np.zeros(design.width)
     for total, places in zip(signatures.totals, signatures.places, strict=True):
@@ -197,7 +193,7 @@ def _spanned(index: np.ndarray, signatures: "SignatureGram", design: "NuisanceDe
 
 
 def _imitating(
-    index: np.ndarray, signatures: "SignatureGram", design: "NuisanceDesign", others: Bools
+    index: np.ndarray, signatures: SignatureGram, design: NuisanceDesign, others: Bools
 ) -> tuple[Floats, float]:
     """Return directions (m, d) of shared nuisance that some signatures span, and the size they may make."""
     at = np.flatnonzero(others[: design.shared])
@@ -307,14 +303,10 @@ class Likelihood:
 
     def _nuisance(self, projections: Floats, applied: Sequence[Applied]) -> Floats:
         """Return b (m,) of a vector by its projections Nᵀ·y (m,)."""
-        kept, normal = self._kept(applied), self._normal
+        kept, normal = self.once.kept(applied), self._normal
         if kept is None:
             return boxed(normal, projections)
         return kept @ boxed(_kept_normal(kept, normal), kept @ projections)
-
-    def _kept(self, applied: Sequence[Applied]) -> Floats | None:
-        """Return the projection (m, m) of b onto what is left of it beside effects of the same form."""
-        return self.once.kept(applied)
 
     def marginal(self, whitened: Floats, applied: Sequence[Applied] = ()) -> Floats:
         """Return the marginal residual (v + m,) of a whitened vector."""
@@ -397,7 +389,7 @@ class Likelihood:
         rows = len(self.clusters)
         return cluster_scores(jacobian[:rows], residual[:rows], self.clusters)
 
-    def gram(self, signatures: Sequence[Floats]) -> "SignatureGram":
+    def gram(self, signatures: Sequence[Floats]) -> SignatureGram:
         """Return the fast view of signatures (k, n, s) of each trace."""
         width = signatures[0].shape[2]
         columns = [

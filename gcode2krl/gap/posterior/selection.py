@@ -91,7 +91,7 @@ def _within(column: Column, coefficients: Floats) -> bool:
 
 def tried(columns: Sequence[Column]) -> float:
     """Return how many candidates were looked at to get these."""
-    return sum(column.tried for column in columns)
+    return sum(column.block.tried for column in columns)
 
 
 def threshold(candidates: float) -> float:
@@ -112,7 +112,7 @@ def ranked(examination: Examination, gram: Gram, allowed: Sequence[Column]) -> l
 
 
 def _is_finding(examination: Examination, score: Score) -> bool:
-    plausible = score.within or examination.data.candidates.block(score.column).effect.plans_anew
+    plausible = score.within or score.column.block.effect.plans_anew
     large = score.gain > _LIMITS.least_ratio**2 * examination.data.times
     return plausible and large and score.surprise > examination.level
 
@@ -120,7 +120,7 @@ def _is_finding(examination: Examination, score: Score) -> bool:
 def _inflation(examination: Examination, gram: Gram, score: Score) -> float:
     # a signature holds for small effects only, and one at a frequency or moment that is searched is as far
     # off as the search is coarse, where the effect is strongest: such gains are judged after the refit
-    effect = examination.data.candidates.block(score.column).effect
+    effect = score.column.block.effect
     is_exact = effect.is_linear and effect.frequency is None and effect.moment is None
     small = score.gain < examination.data.times and is_exact
     return gram.inflation(score.column.index) if small else 1.0
@@ -142,7 +142,7 @@ def shortlist(examination: Examination, scores: Sequence[Score], values: int) ->
     linear: dict[Key, Score] = {}
     planned: dict[Key, Score] = {}
     for score in scores:
-        block = examination.data.candidates.block(score.column)
+        block = score.column.block
         if block.effect.plans_anew:
             planned.setdefault(block.key, score)
         elif _worth(score, values) >= least or (
@@ -229,8 +229,8 @@ def _alike(
     allowed = [
         column
         for column in candidates.columns
-        if candidates.block(column).key not in {*tried, applied.key}
-        and not candidates.block(column).effect.plans_anew
+        if column.block.key not in {*tried, applied.key}
+        and not column.block.effect.plans_anew
         and (column.bent or not applied.effect.is_linear)
     ]
     if not allowed:
@@ -245,12 +245,8 @@ def _alike(
         weights = solve(gram[np.ix_(at, at)], gram[at, :1])[:, 0]
         share = float(weights @ gram[at, 0]) / max(float(gram[0, 0]), 1e-300)
         if share >= _LIMITS.twin_share:
-            yield Twin(column, _start(examination, column, weights / _SMALL), share)
-
-
-def _start(examination: Examination, column: Column, weights: Floats) -> Applied:
-    within = np.clip(weights, column.low, column.high)
-    return examination.data.candidates.block(column).applied(within, examination.traces[0])
+            within = np.clip(weights / _SMALL, column.low, column.high)
+            yield Twin(column, column.block.applied(within, examination.traces[0]), share)
 
 
 def _smaller(applied: Applied, inputs: Inputs) -> Applied:
@@ -384,11 +380,11 @@ def with_rival(examination: Examination, number: int, rival: Applied) -> Examina
     others = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
     before = examination.dropping(number, others)
     key, candidates = rival.key, examination.data.candidates
-    column = next((each for each in candidates.columns if candidates.block(each).key == key), None)
+    column = next((each for each in candidates.columns if each.block.key == key), None)
     if column is None:
         return None
     fitted = refit(examination.likelihood, (*others.applied, rival))
-    surprising = _tested(before, _Trial(column.width, candidates.block(column), fitted))
+    surprising = _tested(before, _Trial(column, fitted))
     return None if surprising is None else _with(before, fitted, surprising)
 
 
@@ -435,7 +431,7 @@ def _grown(examination: Examination) -> tuple[Examination, bool]:
             first_level=threshold(tried(candidates.columns)),
         )
     taken = examination.accepted_keys | examination.rejected
-    allowed = [column for column in candidates.columns if candidates.block(column).key not in taken]
+    allowed = [column for column in candidates.columns if column.block.key not in taken]
     examination = replace(examination, level=threshold(tried(allowed)))
     return _accepted(examination, ranked(examination, gram, allowed), gram.values)
 
@@ -449,12 +445,8 @@ def _accepted(examination: Examination, scores: Sequence[Score], values: int) ->
             surprising = _tested(examination, trial)
             if surprising is not None:
                 return _with(examination, trial.fitted, surprising), True
-            examination = examination.rejecting(trial.block.key)
-        scores = [
-            score
-            for score in scores
-            if examination.data.candidates.block(score.column).key not in examination.rejected
-        ]
+            examination = examination.rejecting(trial.column.block.key)
+        scores = [score for score in scores if score.column.block.key not in examination.rejected]
     return examination, False
 
 
@@ -474,9 +466,7 @@ def _with(examination: Examination, fitted: Fitted, surprising: float) -> Examin
 class _Trial:
     """A candidate and its refit beside the accepted effects."""
 
-    width: int
-    """Number of its columns."""
-    block: Block
+    column: Column
     fitted: Fitted
 
     @property
@@ -489,25 +479,25 @@ def _trials(examination: Examination, scores: Sequence[Score]) -> Iterator[_Tria
     """Yield the refits; one that is far behind those before it is not carried to its end."""
     best = np.inf
     for score in scores:
-        block = examination.data.candidates.block(score.column)
+        block = score.column.block
         start = block.applied(score.coefficients, examination.traces[0])
         if block.effect.plans_anew:
             fitted = replanned(examination, block, start, best)
         else:
             fitted = with_shown_numbers(examination, _refitted(examination, start, best))
         best = min(best, fitted.chi2)
-        yield _Trial(score.column.width, block, fitted)
+        yield _Trial(score.column, fitted)
 
 
 def _twin_trials(examination: Examination, trials: Sequence[_Trial]) -> Iterator[_Trial]:
     """Yield the refits of candidates that do what the best trial does while it is small."""
     best = min(trials, key=lambda trial: trial.cost)
-    if best.block.effect.plans_anew or not np.isfinite(best.cost):
+    if best.column.block.effect.plans_anew or not np.isfinite(best.cost):
         return
-    tried = {*(trial.block.key for trial in trials), *examination.accepted_keys, *examination.rejected}
+    tried = {*(trial.column.block.key for trial in trials), *examination.accepted_keys, *examination.rejected}
     for twin in twins_of(examination, best.fitted.applied[-1], examination.applied, tried):
         fitted = with_shown_numbers(examination, _refitted(examination, twin.start, best.fitted.chi2))
-        yield _Trial(twin.column.width, examination.data.candidates.block(twin.column), fitted)
+        yield _Trial(twin.column, fitted)
 
 
 def _refitted(examination: Examination, start: Applied, best: float) -> Fitted:
@@ -543,10 +533,10 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
         return None
     sensitivity = sensitivity_of(examination.likelihood, fitted, len(fitted.applied) - 1)
     # shapes are searched too, so that chi2 has a degree for each of them
-    surprising = surprise(gain / sensitivity.inflation(), max(trial.width, len(last.names)))
+    surprising = surprise(gain / sensitivity.inflation(), max(trial.column.width, len(last.names)))
     if surprising < examination.level:
         return None
-    if trial.block.effect.plans_anew:
+    if trial.column.block.effect.plans_anew:
         return surprising
     before = examination.likelihood.residual(examination.applied)
     return surprising if sensitivity.left_out_gain(before, _LIMITS.left_out_groups) > 0.0 else None
@@ -639,7 +629,7 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
 def _of_gain(examination: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
     """Yield other effects whose linear gain comes near that of a cause."""
     for score in _ranked(examination, number):
-        block = examination.data.candidates.block(score.column)
+        block = score.column.block
         share = _LIMITS.rival_share if block.effect.is_linear else _LIMITS.bent_rival_share
         if score.gain >= gain - max(share * gain, _LIMITS.rival_gain * spread):
             yield block.applied(score.coefficients, examination.traces[0])
@@ -657,11 +647,7 @@ def _ranked(examination: Examination, number: int) -> list[Score]:
     """Return the plausible scores of other effects with one accepted effect taken away, the best first."""
     gram = examination.data.gram(examination.fitted, without=number)
     candidates = examination.data.candidates
-    columns = [
-        column
-        for column in candidates.columns
-        if candidates.block(column).key not in examination.accepted_keys
-    ]
+    columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
     return sorted((score for score in scores(gram, columns) if score.within), key=lambda score: -score.gain)
 
 
