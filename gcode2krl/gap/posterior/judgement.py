@@ -43,9 +43,9 @@ from gcode2krl.gap.posterior.cause_tests import (
     constancy_of,
     intervals_of,
 )
-from gcode2krl.gap.posterior.examination import Examination, Key, Size, fitted_signal, pooled, size_of_gap
+from gcode2krl.gap.posterior.examination import Examination, Size, fitted_signal, pooled, size_of_gap
 from gcode2krl.gap.posterior.families import Evidence
-from gcode2krl.gap.posterior.likelihood import refit
+from gcode2krl.gap.posterior.likelihood import Key, refit
 from gcode2krl.gap.posterior.selection import Rival, examine, rival_probabilities, rivals_of, with_rival
 from gcode2krl.gap.thresholds import THRESHOLDS
 

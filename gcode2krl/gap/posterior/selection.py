@@ -31,10 +31,10 @@ from gcode2krl.gap.components import Block, Signatures
 from gcode2krl.gap.noise.nuisance import Candidates, Column, Question, nuisance_for
 from gcode2krl.gap.noise.short import Noise
 from gcode2krl.gap.noise.source import noise_of, noise_of_poses
-from gcode2krl.gap.posterior.examination import Examination, Key, LinkData, fitted_mismatch, moments_off
+from gcode2krl.gap.posterior.examination import Examination, LinkData, fitted_mismatch, moments_off
 from gcode2krl.gap.posterior.gram import Gram, solve
 from gcode2krl.gap.posterior.least_squares import Fitted
-from gcode2krl.gap.posterior.likelihood import Sensitivity, refit, searched, sensitivity_of
+from gcode2krl.gap.posterior.likelihood import Key, Sensitivity, refit, searched, sensitivity_of
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 
 _LIMITS = THRESHOLDS.choose
