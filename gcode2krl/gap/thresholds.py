@@ -483,6 +483,14 @@ class ChooseThresholds:
         0.02, "share of its range by which a coefficient may be beyond it: it is the first order of an effect"
     )
     bent_reach: float = convention(1.0, "the same of an effect that is not proportional to its size")
+    bend_nats: float = calibrated(
+        20.0, DEVELOPMENT, "evidence from which the tip does what the measured force says"
+    )
+    bend_off: float = calibrated(
+        0.5,
+        DEVELOPMENT,
+        "so far from 1 may be how much of it the tip does; of a sensor's error it does none",
+    )
     most_causes: int = convention(4, "effects that are accepted in one link")
     most_effects: int = convention(8, "those and effects within normal mismatch")
     most_tried: int = convention(12, "candidates whose gain is judged by its scatter over stretches of time")

@@ -167,6 +167,8 @@ class Trace:
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
     """What was taken out of the measured values because it is the instrument's, in a person's words."""
+    is_shown_at_tip: bool = False
+    """What it has beyond its model the tip has too, so that no slow part of it is its instrument's noise."""
     events: tuple[Event, ...] = ()
     """What was rough or far off for a moment and is not in step with the command (`events`)."""
 

@@ -271,7 +271,12 @@ def _mean_square(values: Sequence[Floats]) -> float:
 
 
 def _calm_mean_square(traces: Sequence[Trace], values: Sequence[Floats], noise: Sequence[Noise]) -> float:
-    """Return the mean square of values (n, k), of each component over its calm rows."""
+    """Return the mean square of values (n, k), of each component over its calm rows.
+
+    Over all where the tip shows the same: those that are loud are no heavy tails.
+    """
+    if traces[0].is_shown_at_tip:
+        return _mean_square(values)
     power = 0.0
     for j, own in enumerate(noise):
         columns = [each[:, j] for each in values]
