@@ -24,6 +24,8 @@ from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.choose
+_SURE = 3.0
+"""Standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,18 @@ class Bend:
     """How much of what that would do the tip does."""
     nats: float
     """The evidence of it."""
+    sigma: float
+    """Of the gain."""
 
     @property
     def is_seen(self) -> bool:
         """Tell whether the tip does what the force says, and not by chance."""
         return self.nats >= _LIMITS.bend_nats and abs(self.gain - 1.0) <= _LIMITS.bend_off
+
+    @property
+    def is_denied(self) -> bool:
+        """Tell whether the tip surely does not do what the force says: that is the sensor's."""
+        return self.gain + _SURE * self.sigma < 1.0 - _LIMITS.bend_off
 
 
 def bends_of(judged: Judgement, context: Context) -> list[Bend]:
@@ -58,7 +67,7 @@ def bends_of(judged: Judgement, context: Context) -> list[Bend]:
     own = MECHANICS.base(context)
     traces = MECHANICS.traces(context.pairs, own)
     if not traces or traces[0].still:
-        return [Bend(each, 0.0, 0.0) for each in bent]
+        return [Bend(each, 0.0, 0.0, np.inf) for each in bent]
     question = replace(question_of(MECHANICS, traces, context), blocks=())
     nuisance = nuisance_for(traces, question, Signatures())
     return [Bend(each, *_followed(traces, MECHANICS.traces(each, own), nuisance)) for each in bent]
@@ -72,10 +81,14 @@ def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Ben
 
 
 def bent_by(bends: Sequence[Bend], context: Context) -> Context:
-    """Return the context whose arm the measured force bends: in air, too, where the tip shows that better."""
-    if not bends:
+    """Return the context whose arm the measured force bends, in air too where the tip shows that better.
+
+    Where the tip does not tell, in the cut alone; where it denies the force, the predicted one goes on.
+    """
+    seen = [bend for bend in bends if bend.is_seen]
+    if not seen and (not bends or bends[0].is_denied):
         return context
-    return context.with_pairs(max(bends, key=lambda bend: bend.nats if bend.is_seen else 0.0).pairs)
+    return context.with_pairs(max(seen or bends[:1], key=lambda bend: bend.nats).pairs)
 
 
 def _is_slow(judged: Judgement) -> bool:
@@ -84,18 +97,19 @@ def _is_slow(judged: Judgement) -> bool:
 
 def _followed(
     traces: Sequence[Trace], bent: Sequence[Trace], nuisance: Sequence[Sequence[Nuisance]]
-) -> tuple[float, float]:
-    """Return how much of what the load would do the tip does, and the evidence of it in nats."""
+) -> tuple[float, float, float]:
+    """Return how much of what the load would do the tip does, its evidence in nats, and its deviation."""
     moved = [there.nominal - trace.nominal for trace, there in zip(traces, bent, strict=True)]
     if not any(each.any() for each in moved):
-        return 0.0, 0.0
+        return 0.0, 0.0, np.inf
     columns = [np.ascontiguousarray(each.T)[:, :, None] for each in moved]
     likelihood = Likelihood(traces, nuisance, noise_of(traces, columns, nuisance))
     rest, way = (_beside_mismatch(likelihood, each) for each in ([trace.residual for trace in traces], moved))
-    gain = float(rest @ way) / max(float(way @ way), 1e-30)
+    power = max(float(way @ way), 1e-30)
+    gain = float(rest @ way) / power
     left = float(np.sum((rest - gain * way) ** 2))
     inflation = max(1.0, left / len(rest))
-    return gain, 0.5 * (float(rest @ rest) - left) / inflation
+    return gain, 0.5 * (float(rest @ rest) - left) / inflation, float(np.sqrt(inflation / power))
 
 
 def _beside_mismatch(likelihood: Likelihood, values: Sequence[Floats]) -> Floats:
