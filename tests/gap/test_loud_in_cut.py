@@ -29,8 +29,9 @@ def gap_of(more):
 
 
 def shakes(generator):
-    phase = generator.uniform(0.0, 2.0 * np.pi)
-    return CUTS * 3.0 * SIGMA_MM * np.sin(2.0 * np.pi * 11.3 * INPUTS.time_s + phase)
+    """Around 25 Hz, as a robot that chatters: it looks like noise of that colour."""
+    ringing = np.convolve(generator.standard_normal(COUNT), [0.5, 0.0, -0.5] * 3, mode="same")
+    return CUTS * 2.0 * SIGMA_MM * ringing
 
 
 def bursts(generator):

@@ -92,7 +92,7 @@ class Size:
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
     loud_in_step: float = 0.0
-    """The power of loud moments in step with the command, or of one joint alone, over that of the noise; 0
+    """The power of loud moments in step with the command, of one joint, or in the cut alone, over the noise's; 0
     where they may be chance."""
 
     @property
@@ -229,14 +229,15 @@ def _loud_in_cut(likelihood: Likelihood, left: Sequence[Floats]) -> float:
         for number, rest in enumerate(left):
             trace = likelihood.traces[number]
             rows = nearest_rows(trace.inputs.time_s, trace.time_s)
-            cuts = trace.inputs.force_base_N.any(axis=1)[rows]
+            cuts = np.any(trace.inputs.force_base_N[rows], axis=1)
             block = ((trace.time_s - trace.time_s[0]) / _EVENT_S).astype(np.int64)
             squares = likelihood.white(number, j, rest[:, [j]])[:, 0] ** 2
-            count, mean = np.bincount(block), np.bincount(block, weights=squares)
-            share = np.bincount(block, weights=cuts) / np.maximum(count, 1)
-            mean /= np.maximum(count, 1)
-            cut.append(mean[(share == 1.0) & (count > 0)])
-            air.append(mean[(share == 0.0) & (count > 0)])
+            count = np.maximum(np.bincount(block), 1)
+            mean = np.bincount(block, weights=squares) / count
+            share = np.bincount(block, weights=cuts) / count
+            is_seen = np.bincount(block) > 0
+            cut.append(mean[is_seen & (share == 1.0)])
+            air.append(mean[is_seen & (share == 0.0)])
         in_cut, in_air = np.concatenate(cut), np.concatenate(air)
         if min(len(in_cut), len(in_air)) < _LEAST_STRETCHES:
             continue
