@@ -92,8 +92,10 @@ class Size:
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
     loud_in_step: float = 0.0
-    """The power of loud moments in step with the command, of one joint, or in the cut alone, over the noise's; 0
-    where they may be chance."""
+    """The power of what is loud in step with the command, in one joint or in the cut, over the noise's.
+
+    0 where that may be chance.
+    """
 
     @property
     def power(self) -> float:
