@@ -15,7 +15,8 @@ from gcode2krl.gap.compare.clocks import on_own_timing, with_controller_clocks
 from gcode2krl.gap.compare.events import rough_spans, sorted_out, without_hum
 from gcode2krl.gap.compare.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING
 from gcode2krl.gap.compare.pair import log_pairs, pairs_of
-from gcode2krl.gap.compare.trace import Context, Link, Span, Trace, evenly_spread, split
+from gcode2krl.gap.compare.trace import Context, Link, Span, Trace, evenly_spread, is_lost, split
+from gcode2krl.gap.posterior.bending import bends_of, bent_by, shown_at_tip
 from gcode2krl.gap.posterior.examination import question_of
 from gcode2krl.gap.posterior.geometry import geometry_of_arm, judge_surface
 from gcode2krl.gap.posterior.judgement import judge
@@ -152,8 +153,15 @@ def _answered(context: Context, begin: Begin) -> Gap:
             judged = evenly_spread(calm)
             shares[link.name] = _rows(judged) / max(1, _rows(calm))
             explain, held = split(judged, context.explaining)
-            judgement = judge(link, explain, held, question_of(link, traces, context))
+            question = question_of(link, traces, context)
+            judgement = judge(link, explain, held, question)
+            bends = bends_of(judgement, context)
+            shown = shown_at_tip(judged, judgement, bends)
+            if shown is not None:
+                judgement = judge(link, *split(shown, context.explaining), question)
             context = link.learn(context.with_judgement(judgement), judgement)
+            if is_lost(judgement):  # what bends the arm beside the named causes
+                context = bent_by(bends_of(judgement, context) if judgement.applied else bends, context)
     begin("part and answer")
     surface = judge_surface(PART, context)
     if surface is not None:

@@ -34,7 +34,7 @@ DEVELOPMENT = range(10_000)
 WITH_ONCE_SCORED = range(16_000)
 """Those and 10000-15999, which are calibration cases since their errors were looked at."""
 
-ONCE_SCORED = range(290_000, 497_000)
+ONCE_SCORED = range(290_000, 517_000)
 """Cases that were scored, told with their figures, and looked at since: none is scored again."""
 
 
@@ -247,6 +247,9 @@ class BesideThresholds:
         90_000, "of a link's measured values: of longer runs evenly spread windows are judged"
     )
     judged_window_s: float = convention(2.0, "of such a window: longer than an instrument remembers")
+    stepped_windows: int = convention(
+        2, "more of these, of each run and component, where its level changes most: a step has two"
+    )
     remembered_plan_rows: int = convention(150_000, "of the plans of one prediction: some 1.1 kB each")
     remembered_paths: int = convention(64, "commanded paths that are kept")
     remembered_rows: int = convention(200_000, "of these paths together: some 700 bytes each")
@@ -482,6 +485,14 @@ class ChooseThresholds:
         0.02, "share of its range by which a coefficient may be beyond it: it is the first order of an effect"
     )
     bent_reach: float = convention(1.0, "the same of an effect that is not proportional to its size")
+    bend_nats: float = calibrated(
+        20.0, DEVELOPMENT, "evidence from which the tip does what the measured force says"
+    )
+    bend_off: float = calibrated(
+        0.5,
+        DEVELOPMENT,
+        "so far from 1 may be how much of it the tip does; of a sensor's error it does none",
+    )
     most_causes: int = convention(4, "effects that are accepted in one link")
     most_effects: int = convention(8, "those and effects within normal mismatch")
     most_tried: int = convention(12, "candidates whose gain is judged by its scatter over stretches of time")

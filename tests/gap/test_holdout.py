@@ -115,6 +115,15 @@ def test_of_long_runs_windows_all_over_the_time_are_judged():
         assert min(lasts[1:-1]) > 1.9
 
 
+@pytest.mark.parametrize("at_s", [1234.5, 1236.9, 2001.0])
+def test_the_windows_around_a_step_are_judged(at_s):
+    long = run(0, 8000.0)
+    stepped = replace(long, measured=long.measured + 0.5 * (long.time_s > at_s)[:, None])
+    (judged,) = evenly_spread([stepped])
+    around = np.abs(long.time_s - at_s) < 0.3
+    assert set(long.time_s[around]) <= set(judged.time_s)
+
+
 def test_ordinary_runs_and_poses_are_judged_whole():
     ordinary, poses = run(0, 1500.0), replace(run(0, 8000.0), still=True)
     assert evenly_spread([ordinary])[0] is ordinary

@@ -28,7 +28,7 @@ class HosePack(Effect):
     family = "sensor"
     links = frozenset({"force"})
     where = frozenset({Where.FORCE_AXIS})
-    depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
+    depends_on = frozenset({Dependence.PLACE})
     vectors = MappingProxyType({"h0_N": _H0, "H_N_rad": _H})
     parameters = (
         *(

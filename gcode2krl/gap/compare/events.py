@@ -423,10 +423,15 @@ def _in_step(
         [bool(rows[each.first : each.last].any()) for each in spans]
         for spans, rows in zip(stretches, chosen, strict=True)
     ]
-    events = [not _is_outlier(each) for own in stretches for each in own]
-    counted = sum(a and b for a, b in zip(events, [each for own in inside for each in own], strict=True))
-    share = float(np.mean(np.concatenate(list(chosen))))
-    chance = bdtrc(counted - 1, sum(events), share) if counted else 1.0
+    # by its middle row, since a long stretch touches chosen rows more often than a row is chosen
+    middles = [
+        bool(rows[(each.first + each.last) // 2])
+        for own, rows in zip(stretches, chosen, strict=True)
+        for each in own
+        if not _is_outlier(each)
+    ]
+    counted, share = sum(middles), float(np.mean(np.concatenate(list(chosen))))
+    chance = bdtrc(counted - 1, len(middles), share) if counted else 1.0
     if counted >= least and chance < _LIMITS.in_step_p:
         return inside
     return [[False] * len(own) for own in stretches]

@@ -87,6 +87,21 @@ def frame_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     return turned
 
 
+def load_columns(trace: Trace, mismatch: Mismatch) -> Floats:
+    """Return what the zero and the gain of a sensor do to a tip whose arm the measured force bends."""
+    inputs = trace.inputs
+    load_N = inputs.load_base_N
+    assert load_N is not None
+    bends = np.any(load_N, axis=1, keepdims=True)
+    columns = []
+    for axis in np.moveaxis(inputs.sensor_rotation, 2, 0):
+        along_N = np.sum(axis * load_N, axis=1, keepdims=True)
+        for more_N in (sigma(mismatch.force_zero_N) * bends, sigma(mismatch.sensor_gain) * along_N):
+            off = replace(trace, inputs=replace(inputs, load_base_N=load_N + axis * more_N))
+            columns.append(_stacked(off.nominal - trace.nominal))
+    return np.stack(columns, axis=2)
+
+
 def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     """Return (k, n, 1): what the clock of the table does to the signal, to first order."""
     return -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
@@ -490,15 +505,9 @@ class ForceLink(Link):
         yield "sensor gain", component_columns(trace.nominal) * sigma(mismatch.sensor_gain)
 
     def learn(self, context: Context, judged: FittedVerdict) -> Context:
-        """Let the named causes bend the arm; where the model does not hold, let the measured force do so."""
+        """Let the named causes bend the arm."""
         learned = (applied.effect.learned(applied, self.name) for applied in judged.applied)
-        context = context.with_learned(applied for applied in learned if applied is not None)
-        if is_lost(judged):
-            base = self.base(context)
-            seen, bending = (*base, *judged.applied), (*base, *context.learned)
-            pairs = (pair.with_measured_load(seen, bending) for pair in context.pairs)
-            context = context.with_pairs(pairs)
-        return context
+        return context.with_learned(applied for applied in learned if applied is not None)
 
 
 class MechanicsLink(Link):
@@ -551,8 +560,10 @@ class MechanicsLink(Link):
         return max(super().clocks(context), 2 if on_two else 1)
 
     def mismatch(self, trace: Trace, mismatch: Mismatch) -> Iterator[tuple[str, Floats]]:
-        """Yield the frame in which the tracker states the tip."""
+        """Yield the frame in which the tracker states the tip, and the sensor of a measured load."""
         yield "tracker frame", frame_columns(trace, mismatch)
+        if trace.inputs.load_base_N is not None:
+            yield "sensor of the load", load_columns(trace, mismatch)
 
     def has_time_law(self, unmeasured: frozenset[str]) -> bool:
         """Tell whether the commanded path is not measured, so that the tip shows its time law."""

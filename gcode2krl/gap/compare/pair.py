@@ -217,12 +217,14 @@ class Pair:
         """Return the pair with a clock error of ``offset_s`` taken off the stamps of a table."""
         return replace(self, clock_s={**self.clock_s, table: self.clock_s.get(table, 0.0) + offset_s})
 
-    def with_measured_load(self, applied: Sequence[Applied] = (), base: Sequence[Applied] = ()) -> "Pair":
+    def with_measured_load(
+        self, applied: Sequence[Applied] = (), base: Sequence[Applied] = (), *, in_air: bool = False
+    ) -> "Pair":
         """Return the pair whose arm is bent by the measured force, for a model of the force that fails.
 
         The load is the model's with the effects ``base``, and what is measured beside the model with
         ``applied``, averaged over 50 ms: the edges of the cut stay those of the model, where an average of
-        the force itself would smear them. It is zero where the cutter is predicted in air.
+        the force itself would smear them. It is zero where the cutter is predicted in air, unless ``in_air``.
         """
         table, inputs = self.run.force, self.inputs
         if table is None or inputs.forces is None:
@@ -237,7 +239,8 @@ class Pair:
         bending = simulate(inputs, base).force_base_N if base else inputs.force_base_N
         off_N = running_mean(force_N - linear(own_s, inputs.time_s, seen), rows)
         load = bending + linear(inputs.time_s, own_s, off_N)
-        load[~inputs.force_base_N.any(axis=1)] = 0.0
+        if not in_air:
+            load[~inputs.force_base_N.any(axis=1)] = 0.0
         return replace(self, inputs=replace(inputs, load_base_N=load))
 
     def with_measured_joints(self, upto: str) -> "Pair":

@@ -201,6 +201,8 @@ class Trace:
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
     """What was taken out of the measured values because it is the instrument's, in a person's words."""
+    is_shown_at_tip: bool = False
+    """What it has beyond its model the tip has too, so that no slow part of it is its instrument's noise."""
     events: tuple[Event, ...] = ()
     """What was rough or far off for a moment and is not in step with the command (`events`)."""
 
@@ -378,7 +380,8 @@ def evenly_spread(traces: Sequence[Trace]) -> list[Trace]:
     """Return the traces of a link, of long runs with the rows of evenly spread windows of time alone.
 
     What the columns of all effects take in memory and time goes with the rows; what they tell of a cause goes
-    with the root of their number. Events are sought in all rows before.
+    with the root of their number. Events are sought in all rows before; of each run the windows over which
+    its level changes most are kept too, since the moment of a step is in one of them.
     """
     share = _LIMITS.judged_values / max(1, sum(trace.measured.size for trace in traces))
     if share >= 1.0 or any(trace.still for trace in traces):
@@ -386,8 +389,19 @@ def evenly_spread(traces: Sequence[Trace]) -> list[Trace]:
     kept = []
     for trace in traces:
         window = ((trace.time_s - trace.time_s[0]) / _LIMITS.judged_window_s).astype(np.int64)
-        kept.append(with_rows(trace, np.floor((window + 1) * share) > np.floor(window * share)))
+        is_even = np.floor((window + 1) * share) > np.floor(window * share)
+        kept.append(with_rows(trace, is_even | np.isin(window, _stepped(trace, window))))
     return kept
+
+
+def _stepped(trace: Trace, window: Ints) -> Ints:
+    """Return the windows over which the median of the rest changes most, for each component."""
+    first = np.flatnonzero(np.diff(window, prepend=-1))
+    medians = np.stack([np.median(rows, axis=0) for rows in np.split(trace.residual, first[1:])])
+    change = np.abs(medians[2:] - medians[:-2])
+    if len(change) == 0:
+        return window[:0]
+    return window[first[1 + np.argsort(change, axis=0)[-_LIMITS.stepped_windows :]]].ravel()
 
 
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:

@@ -82,7 +82,7 @@ def noise_of(
     slow = [
         _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
     ]
-    if _in_few_joints(traces[0], slow):
+    if traces[0].is_shown_at_tip or _in_few_joints(traces[0], slow):
         slow = [()] * len(slow)
     generator = np.random.default_rng(0)
     slow_drawn = [

@@ -597,11 +597,7 @@ def _is_in(components: frozenset[int], evidence: Evidence) -> bool:
 def _is_of(applied: Applied, evidence: Evidence) -> bool:
     """Tell whether a family is that of an effect at its target."""
     effect, place = applied.effect, evidence.place
-    states = evidence.on in effect.depends_on
-    # what depends on the place is constant where the tool hardly moves or turns
-    if evidence.on is Dependence.CONSTANT and Dependence.PLACE in effect.depends_on:
-        states = True
-    if not states or place.where not in effect.where:
+    if evidence.on not in effect.depends_on or place.where not in effect.where:
         return False
     at_a_joint = place.where is Where.JOINT and applied.target in JOINTS
     return not at_a_joint or place.name in (applied.target, TIMING)

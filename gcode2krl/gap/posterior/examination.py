@@ -38,7 +38,7 @@ from gcode2krl.effects.effect import JOINTS
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
 from gcode2krl.gap.compare.events import command_changes
-from gcode2krl.gap.compare.interpolation import rms, usual_step_s, values_of
+from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s, values_of
 from gcode2krl.gap.compare.links import SIGNALS
 from gcode2krl.gap.compare.trace import Context, Link, Trace, stretches_of, stretches_of_all
 from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_from, blocks_of, strongest_hz
@@ -59,6 +59,8 @@ _MOST_LAGS = 2000
 """Over which the autocovariance is summed; a slow part has forgotten by then."""
 _MOMENT_ROWS, _LOUD = 12, 4.0
 """Rows of a moment, and so many times the median moment's power is loud: of white noise one in 10^6."""
+_LEAST_STRETCHES = 8
+"""In the cut and in air, which are compared."""
 _EVENT_S = 0.3
 """Loud moments no farther apart are one event."""
 
@@ -90,8 +92,10 @@ class Size:
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
     loud_in_step: float = 0.0
-    """The power of loud moments in step with the command, or of one joint alone, over that of the noise; 0
-    where they may be chance."""
+    """The power of what is loud in step with the command, in one joint or in the cut, over the noise's.
+
+    0 where that may be chance.
+    """
 
     @property
     def power(self) -> float:
@@ -173,7 +177,9 @@ def size_of_gap(
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
-        loud_in_step=max(_loud_in_step(likelihood, structured), _rough_joint(likelihood, structured)),
+        loud_in_step=max(
+            each(likelihood, structured) for each in (_loud_in_step, _rough_joint, _loud_in_cut)
+        ),
     )
 
 
@@ -207,6 +213,40 @@ def _rough_joint(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     beyond = np.sort(power - np.median(power, axis=1, keepdims=True), axis=0)
     share = float(np.max(beyond[-min(2, len(beyond))]))
     return share if share > _LIMITS.rough_joint else 0.0
+
+
+def _loud_in_cut(likelihood: Likelihood, left: Sequence[Floats]) -> float:
+    """Return by how much louder a tip is in the cut than in air, over that; 0 where it may be chance.
+
+    A tracker knows nothing of the cut: what is louder there shakes the tip (a rank test, Mann & Whitney 1947,
+    over stretches as long as an event).
+    """
+    from scipy.stats import mannwhitneyu
+
+    if not likelihood.traces[0].link.of_tip or likelihood.traces[0].still:
+        return 0.0
+    loudest = 0.0
+    for j in range(len(likelihood.noise)):
+        cut, air = [], []
+        for number, rest in enumerate(left):
+            trace = likelihood.traces[number]
+            rows = nearest_rows(trace.inputs.time_s, trace.time_s)
+            cuts = np.any(trace.inputs.force_base_N[rows], axis=1)
+            block = ((trace.time_s - trace.time_s[0]) / _EVENT_S).astype(np.int64)
+            squares = likelihood.white(number, j, rest[:, [j]])[:, 0] ** 2
+            count = np.maximum(np.bincount(block), 1)
+            mean = np.bincount(block, weights=squares) / count
+            share = np.bincount(block, weights=cuts) / count
+            is_seen = np.bincount(block) > 0
+            cut.append(mean[is_seen & (share == 1.0)])
+            air.append(mean[is_seen & (share == 0.0)])
+        in_cut, in_air = np.concatenate(cut), np.concatenate(air)
+        if min(len(in_cut), len(in_air)) < _LEAST_STRETCHES:
+            continue
+        more = float(np.median(in_cut)) / max(float(np.median(in_air)), 1e-30) - 1.0
+        if mannwhitneyu(in_cut, in_air, alternative="greater").pvalue < _LIMITS.loud_p / 3.0:
+            loudest = max(loudest, more)
+    return loudest if loudest > _LIMITS.rough_joint else 0.0
 
 
 def _loud_in_step(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
@@ -271,7 +311,12 @@ def _mean_square(values: Sequence[Floats]) -> float:
 
 
 def _calm_mean_square(traces: Sequence[Trace], values: Sequence[Floats], noise: Sequence[Noise]) -> float:
-    """Return the mean square of values (n, k), of each component over its calm rows."""
+    """Return the mean square of values (n, k), of each component over its calm rows.
+
+    Over all where the tip shows the same: those that are loud are no heavy tails.
+    """
+    if traces[0].is_shown_at_tip:
+        return _mean_square(values)
     power = 0.0
     for j, model in enumerate(noise):
         columns = [each[:, j] for each in values]

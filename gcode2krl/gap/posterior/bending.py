@@ -1,0 +1,119 @@
+"""What bends the arm where the model of the force fails: the tip tells it from an error of the sensor.
+
+A force that is there bends the arm; an error of its sensor does not. With X what the measured force less the
+predicted one would do to the tip, and r what the tip does beside its prediction, both less normal mismatch,
+r = g·X + noise: g is near 1 where the force is there, and near 0 where it is the sensor's. What is noise of
+the sensor in X makes g smaller (errors in variables, Fuller 1987).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcode2krl.arrays import Floats
+from gcode2krl.gap.compare.links import FORCE, MECHANICS
+from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.trace import Context, Trace, is_lost
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import Nuisance, nuisance_for
+from gcode2krl.gap.noise.source import noise_of
+from gcode2krl.gap.posterior.examination import fitted_mismatch, question_of
+from gcode2krl.gap.posterior.judgement import Judgement
+from gcode2krl.gap.posterior.likelihood import Likelihood
+from gcode2krl.gap.thresholds import THRESHOLDS
+
+_LIMITS = THRESHOLDS.choose
+_SURE = 3.0
+"""Standard deviations."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Runs whose arm the measured force bends, and what the tip says to it."""
+
+    pairs: tuple[Pair, ...]
+    gain: float
+    """How much of what that would do the tip does."""
+    nats: float
+    """The evidence of it."""
+    sigma: float
+    """Of the gain."""
+
+    @property
+    def is_seen(self) -> bool:
+        """Tell whether the tip does what the force says, and not by chance."""
+        return self.nats >= _LIMITS.bend_nats and abs(self.gain - 1.0) <= _LIMITS.bend_off
+
+    @property
+    def is_denied(self) -> bool:
+        """Tell whether the tip surely does not do what the force says: that is the sensor's."""
+        return self.gain + _SURE * self.sigma < 1.0 - _LIMITS.bend_off
+
+
+def bends_of(judged: Judgement, context: Context) -> list[Bend]:
+    """Return the arm bent by the measured force, in the cut alone and in air too, where its model may fail.
+
+    Of the force link alone, where it is lost or the noise learnt has a slow part; else none.
+    """
+    if judged.link is not FORCE or not (is_lost(judged) or _is_slow(judged)):
+        return []
+    base = FORCE.base(context)
+    seen, bending = (*base, *judged.applied), (*base, *context.learned)
+    bent = [
+        tuple(pair.with_measured_load(seen, bending, in_air=in_air) for pair in context.pairs)
+        for in_air in (False, True)
+    ]
+    own = MECHANICS.base(context)
+    traces = MECHANICS.traces(context.pairs, own)
+    if not traces or traces[0].still:
+        return [Bend(each, 0.0, 0.0, np.inf) for each in bent]
+    question = replace(question_of(MECHANICS, traces, context), blocks=())
+    nuisance = nuisance_for(traces, question, Signatures())
+    return [Bend(each, *_followed(traces, MECHANICS.traces(each, own), nuisance)) for each in bent]
+
+
+def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Bend]) -> list[Trace] | None:
+    """Return the traces of a force whose slow noise bends the arm, and so is no noise; else None."""
+    if not (bends and _is_slow(judged) and any(bend.is_seen for bend in bends)):
+        return None
+    return [replace(trace, is_shown_at_tip=True) for trace in traces]
+
+
+def bent_by(bends: Sequence[Bend], context: Context) -> Context:
+    """Return the context whose arm the measured force bends, in air too where the tip shows that better.
+
+    Where the tip does not tell, in the cut alone; where it denies the force, the predicted one goes on.
+    """
+    seen = [bend for bend in bends if bend.is_seen]
+    if not seen and (not bends or bends[0].is_denied):
+        return context
+    return context.with_pairs(max(seen or bends[:1], key=lambda bend: bend.nats).pairs)
+
+
+def _is_slow(judged: Judgement) -> bool:
+    return any(noise.slow for noise in judged.examination.noise)
+
+
+def _followed(
+    traces: Sequence[Trace], bent: Sequence[Trace], nuisance: Sequence[Sequence[Nuisance]]
+) -> tuple[float, float, float]:
+    """Return how much of what the load would do the tip does, its evidence in nats, and its deviation."""
+    moved = [there.nominal - trace.nominal for trace, there in zip(traces, bent, strict=True)]
+    if not any(each.any() for each in moved):
+        return 0.0, 0.0, np.inf
+    columns = [np.ascontiguousarray(each.T)[:, :, None] for each in moved]
+    likelihood = Likelihood(traces, nuisance, noise_of(traces, columns, nuisance))
+    rest, way = (_beside_mismatch(likelihood, each) for each in ([trace.residual for trace in traces], moved))
+    power = max(float(way @ way), 1e-30)
+    gain = float(rest @ way) / power
+    left = float(np.sum((rest - gain * way) ** 2))
+    inflation = max(1.0, left / len(rest))
+    return gain, 0.5 * (float(rest @ rest) - left) / inflation, float(np.sqrt(inflation / power))
+
+
+def _beside_mismatch(likelihood: Likelihood, values: Sequence[Floats]) -> Floats:
+    """Return values (n, k) of all traces, whitened, less the mismatch that fits them best."""
+    own, shared = fitted_mismatch(likelihood, values)
+    left = [value - a - b for value, a, b in zip(values, own, shared, strict=True)]
+    return likelihood.whiten(left)
