@@ -248,8 +248,9 @@ class BesideThresholds:
     )
     judged_window_s: float = convention(2.0, "of such a window: longer than an instrument remembers")
     stepped_windows: int = convention(
-        2, "more of these, of each run and component, where its level changes most: a step has two"
+        2, "more of these of each run, where the level of the rest changes most: a step is seen in two"
     )
+    stepped_times: float = convention(8.0, "the usual change of the level, from which they are judged too")
     remembered_plan_rows: int = convention(150_000, "of the plans of one prediction: some 1.1 kB each")
     remembered_paths: int = convention(64, "commanded paths that are kept")
     remembered_rows: int = convention(200_000, "of these paths together: some 700 bytes each")

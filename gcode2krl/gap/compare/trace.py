@@ -395,13 +395,15 @@ def evenly_spread(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _stepped(trace: Trace, window: Ints) -> Ints:
-    """Return the windows over which the median of the rest changes most, for each component."""
+    """Return the windows over which the median of the rest changes most, if far more than it usually does."""
     first = np.flatnonzero(np.diff(window, prepend=-1))
     medians = np.stack([np.median(rows, axis=0) for rows in np.split(trace.residual, first[1:])])
     change = np.abs(medians[2:] - medians[:-2])
     if len(change) == 0:
         return window[:0]
-    return window[first[1 + np.argsort(change, axis=0)[-_LIMITS.stepped_windows :]]].ravel()
+    times = np.max(change / np.maximum(np.median(change, axis=0), 1e-300), axis=1)
+    most = np.argsort(times)[-_LIMITS.stepped_windows :]
+    return window[first[1 + most[times[most] > _LIMITS.stepped_times]]]
 
 
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:
