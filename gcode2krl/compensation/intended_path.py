@@ -262,8 +262,8 @@ def _off_edge(ways: Ways, evaluated: Evaluated, placed: Placed, away: Floats, at
 
     ``away`` (m, 3) from the start of a line to the bent tip. A place at the height z of the axis moves by
     u + z·w for a mm of the tip's way, u that of the line and w the turn of the axis: a shift along that
-    leaves the same surface. What is normal to it is taken at the tip, at the depth of cut, and where the shift
-    is all across; of a ball at its middle alone, as its surface moves like that.
+    leaves the same surface. What is normal to it is taken at the tip, at the depth of cut, and where the
+    shift is all across; of a ball at its middle alone, as its surface moves like that.
     """
     row, axis = placed.row[at], tool_axes(evaluated[0])[at]
     shift = away[at] - (placed.path_mm[at] - ways.begin_mm[row])[:, None] * ways.unit[row]

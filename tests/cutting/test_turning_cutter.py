@@ -43,7 +43,7 @@ def edge_of(tool, bits=400):
 
 
 def brute_force(tool, axis, feed, swing, top_mm=0.0):
-    """Return the mean force (3,) and moment about the tip (3,) of a tool that has just come into a half space."""
+    """Return the mean force (3,) and moment about the tip (3,) of a tool that has come into a half space."""
     r, z, out_r, out_z, length = edge_of(tool)
     any_way = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     first = np.cross(axis, any_way) / np.linalg.norm(np.cross(axis, any_way))
