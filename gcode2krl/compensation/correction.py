@@ -18,6 +18,10 @@ from gcode2krl.compensation.intended_path import MOST_SLOPE, Evaluated, Placed, 
 
 SETTLED_MM = 1e-3
 """Change of the targets below which the rounds end; smaller differences are ignored."""
+_COLLINEAR = 1e-7
+"""1 minus the cosine of a turn, 0.03°, up to which two lines are one."""
+_ALONG_OF_WAY = 1.0 / 3.0
+"""Most that two targets come closer or farther, over the way between them."""
 
 
 @dataclass(frozen=True)
@@ -305,15 +309,33 @@ def _on_curve(ways: Ways, row: Rows, value: Floats, tolerance_mm: float) -> Floa
     """Return the shifts (k, 3) of targets on a curve: normal to it, and along it only what its chords need.
 
     Without its component s along the curve a value misses the normals of the two chords by s·sin(turn/2); as
-    much of s is kept as brings that down to a quarter of the tolerance.
+    much of s is kept as brings that down to a quarter of the tolerance. Where the tool turns, lines are
+    divided by their turn too: at targets between two collinear pieces it changes evenly, and by at most a
+    third of the way, so that no piece runs backwards.
     """
     mean = ways.unit[row] + ways.unit[row + 1]
     normal = compliance.project_normal(value, mean)
     along = value - normal
     missed = np.linalg.norm(along, axis=1) * np.sqrt(np.maximum(1.0 - ways.cos_turn[row], 0.0) / 2.0)
     kept = np.maximum(0.0, 1.0 - tolerance_mm / 4.0 / np.where(missed > 0.0, missed, 1e-9))
+    if ways.turn[row].any():
+        along = _evenly_along(ways, row, along, kept)
+        kept = np.ones(len(row))
     result: Floats = normal + kept[:, None] * along
     return result
+
+
+def _evenly_along(ways: Ways, row: Rows, along: Floats, kept: Floats) -> Floats:
+    """Return how far (k, 3) targets move along a run; where it bends ``kept`` (k,) of ``along`` is wanted."""
+    unit, at_mm = ways.unit[row], ways.end_mm[row]
+    size = np.einsum("ij,ij->i", along, unit)
+    bends = ways.cos_turn[row] < 1.0 - _COLLINEAR
+    amount = np.interp(at_mm, at_mm[bends], (kept * size)[bends]) if bends.any() else np.zeros(len(row))
+    amount = np.clip(amount, -np.abs(size), np.abs(size))
+    room = np.minimum(at_mm - ways.begin_mm[row[0]], ways.end_mm[row[-1] + 1] - at_mm) * _ALONG_OF_WAY
+    amount = np.clip(_no_steeper(at_mm, amount[:, None], _ALONG_OF_WAY)[:, 0], -room, room)
+    share: Floats = (amount / np.where(size == 0.0, 1.0, size))[:, None] * along
+    return share
 
 
 def _on_line(ways: Ways, row: int, run: LineRun, along_mm: Floats) -> Floats:

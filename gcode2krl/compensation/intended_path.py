@@ -178,20 +178,21 @@ def _pieces(targets: Targets, turn_per_mm: Floats, cell: Cell) -> tuple[Floats, 
     The pieces that the controller plans ahead are together as long as the stopping distance v·(v/a + k)/2, so
     that dividing a line does not slow it down; the approximation at the ends of the line does not change.
     With an approximation distance d between pieces a kink takes the acceleration v²·angle/(2·d) <= a. Where
-    the tool turns, both v and a are those that the speed and the acceleration of its turn leave.
+    the tool turns, the stopping distance is that which the acceleration of its turn needs.
     """
     controller = cell.controller
     a_mm_s2, v = controller.acc_cp_m_s2 * MM_PER_M, np.nan_to_num(targets.speed_mm_s)
+    a_along: float | Floats = a_mm_s2
     if turn_per_mm.any():
         mm_per_rad = 1.0 / np.maximum(turn_per_mm, 1e-12)
-        a_mm_s2 = np.minimum(a_mm_s2, controller.acc_ori_deg_s2 * RAD_PER_DEG * mm_per_rad)
+        a_along = np.minimum(a_mm_s2, controller.acc_ori_deg_s2 * RAD_PER_DEG * mm_per_rad)
         v = np.minimum(v, controller.vel_ori_deg_s * RAD_PER_DEG * mm_per_rad)
     ahead = _PLANNED_AHEAD if controller.advance == "unlimited" else int(controller.advance)
     if ahead == 0:  # every target is an exact stop: each piece adds a stop
         return np.full(len(v), np.inf), np.zeros(len(v)), np.full(len(v), MOST_SLOPE)
     reach = np.maximum(targets.cdis_mm, np.append(0.0, targets.cdis_mm[:-1]))
     piece = np.maximum(
-        v * (v / a_mm_s2 + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * reach, _LEAST_PIECE_MM)
+        v * (v / a_along + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * reach, _LEAST_PIECE_MM)
     )
     level = np.searchsorted(LEVELS_MM, piece / 2.0, side="right") - 1
     cdis = LEVELS_MM[level]

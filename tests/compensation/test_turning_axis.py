@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import compliance, write_krl
 from gcode2krl.cell.sections import Machine, Tool
+from gcode2krl.compensation import iteration
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Placed, Ways, deviation_from
 from gcode2krl.compensation.iteration import compensate
 from gcode2krl.errors import RefusedError
@@ -247,6 +248,39 @@ def test_divided_lines_turn_as_the_whole_ones_did_and_are_no_slower(head):
         times.append(np.interp(at, motion.position_mm[on, 0], motion.time_s[on]))
     np.testing.assert_allclose(tilts[1], tilts[0], atol=0.02)
     np.testing.assert_allclose(times[1], times[0], atol=0.012)
+
+
+def rounding(lines, turn_deg):
+    """A polygon whose axis turns: each side is several collinear pieces, as the turn is divided."""
+    words = ["G1 Z-2 F600"]
+    for k in range(1, lines + 1):
+        angle = np.radians(6.0 * k)
+        words.append(
+            f"X{30 * np.sin(angle):.3f} Y{30 - 30 * np.cos(angle):.3f} A{turn_deg * k / lines:.3f} F1200"
+        )
+    return "\n".join(words) + "\n"
+
+
+def test_no_piece_of_a_polygon_runs_backwards(head):
+    """Corners of 6° move along the curve by most of the deflection, and so do the places between them."""
+    _, _, done = corrected(rounding(24, 60.0), head, lambda motion: 2.2 * in_tool(motion))
+    before, after = (np.diff(each.position_mm, axis=0) for each in (done.intended, done.targets))
+    cuts = (done.intended.position_mm[1:, 2] == -2.0) & (done.intended.position_mm[:-1, 2] == -2.0)
+    share = np.einsum("ij,ij->i", before, after)[cuts] / np.einsum("ij,ij->i", before, before)[cuts]
+    along = np.einsum(
+        "ij,ij->i", done.targets.position_mm - done.intended.position_mm, np.vstack([before, before[-1:]])
+    )
+    assert np.abs(along).max() > 1.0
+    assert share.min() > 0.5
+    assert share.max() < 1.6
+    assert done.after.rms_mm < 0.4 * done.before.rms_mm
+
+
+def test_a_program_that_would_become_slower_is_refused(head, monkeypatch):
+    """The corrected way is longer than the intended one: here no longer cut is allowed at all."""
+    monkeypatch.setattr(iteration, "MOST_SLOWER", 1.0)
+    with pytest.raises(RefusedError, match="makes the cut last"):
+        corrected(rounding(24, 60.0), head, lambda motion: 2.2 * in_tool(motion))
 
 
 def test_a_turn_on_the_spot_is_refused_in_material_alone(head):
