@@ -93,13 +93,17 @@ class Contact(NamedTuple):
             forces.moment_base_Nmm[sample],
         )
 
-    def against(self, placed: Placed, evaluated: Evaluated, cell: Cell) -> Floats:
-        """Return minus the deflection (k, 3) at the places, with the arm as at the nearest sample."""
+    def against(self, placed: Placed, evaluated: Evaluated, cell: Cell, turns: bool) -> Floats:
+        """Return minus the deflection (k, 3) at the places, with the arm as at the nearest sample.
+
+        Where the tool ``turns``, as between two: the samples of a round move, and the arm with each.
+        """
         path_mm, sample = placed.distinct()
         near = sample[np.searchsorted((path_mm[1:] + path_mm[:-1]) / 2.0, self.path_mm)]
         motion, joints = evaluated[:2]
+        q_rad = interpolated(self.path_mm, path_mm, joints.q_rad[sample]) if turns else joints.q_rad[near]
         load = (self.force_base_N, self.moment_base_Nmm, np.zeros(3), cell, motion.tool[near])
-        return -compliance.deflection_of(joints.q_rad[near], *load)[0]
+        return -compliance.deflection_of(q_rad, *load)[0]
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""
@@ -156,7 +160,7 @@ def wanted_correction(
     divided = ways.begin_mm[before.row] + before.along_mm
     runs = []
     if len(contact.path_mm):
-        against = contact.against(placed, evaluated, cell)
+        against = contact.against(placed, evaluated, cell, bool(ways.turn.any()))
         runs = [_run(ways, first, last, against, contact, divided) for first, last in ways.runs()]
     target_mm = _corners(ways, runs)
     ramped = np.ones(len(contact.path_mm), dtype=np.bool_)

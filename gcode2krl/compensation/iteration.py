@@ -28,8 +28,6 @@ MOST_BAND = 0.5
 """Half-width of the 90 % band over the deflection above which a correction may do more harm than good."""
 MOST_CORRECTION_MM = 10.0
 """A larger correction is refused: no robot that cuts bends that far, and lines would lose their shape."""
-MOST_SLOWER = 1.1
-"""Time in the cut, of a turning tool, over that before the correction."""
 _MOST_ROUNDS = 15
 _DIVIDING_ROUNDS = 3
 """After this many rounds lines are divided no further, so that the targets of two rounds compare row by
@@ -81,8 +79,8 @@ def compensate(
         Where the tolerance is not positive.
     RefusedError
         Where the deflection is too unsure (see `refuse_unsure`), a correction is larger than
-        `MOST_CORRECTION_MM`, the rounds do not settle, or the tool turns on the spot in material or would be
-        slowed down while it turns.
+        `MOST_CORRECTION_MM`, the rounds do not settle, a line would run backwards, or the tool turns on the
+        spot in material.
     """
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive", "0.01 is usual")
@@ -103,9 +101,7 @@ def compensate(
         if change_mm <= SETTLED_MM:
             break
     _refuse_backwards(plain, moved)
-    if ways.turn.any():
-        _refuse_turns_on_the_spot(targets, ways, shift, motion, forces)
-        _refuse_slower(first, evaluated, targets.source)
+    _refuse_turns_on_the_spot(targets, ways, shift, motion, forces)
     was = deviation_from(ways, first, before.placed, before.ramped)
     now = deviation_from(ways, evaluated, field.placed, field.ramped)
     issues = (
@@ -263,23 +259,6 @@ def _refuse_turns_on_the_spot(
     sentence = "the tool turns on the spot in material: the correction changes along a way, and there is none"
     remedy = "turn the tool while it moves, or retract, turn, and enter again"
     raise RefusedError(Issue("error", "axis-turns", int(targets.source_line[rows[0]]), sentence, remedy))
-
-
-def _refuse_slower(before: Evaluated, after: Evaluated, source: str) -> None:
-    """Raise where the corrected cut takes so long that the forces of the programmed speed are wrong."""
-    cuts_s, slower_s = (
-        np.count_nonzero(forces.force_base_N.any(axis=1)) * float(motion.time_s[1])
-        for motion, _, forces, _ in (before, after)
-    )
-    if slower_s <= MOST_SLOWER * cuts_s:
-        return
-    sentence = (
-        f"the correction makes the cut last {slower_s:.1f} s, not {cuts_s:.1f} s: a turning tool takes "
-        "corners more slowly, and the forces are those of the programmed speed"
-    )
-    raise RefusedError(
-        Issue("error", "axis-turns", 0, sentence, "lower F, or let the CAM take finer steps"), source
-    )
 
 
 def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Issue]:

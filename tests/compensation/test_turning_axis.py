@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import compliance, write_krl
 from gcode2krl.cell.sections import Machine, Tool
-from gcode2krl.compensation import iteration
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Placed, Ways, deviation_from
 from gcode2krl.compensation.iteration import compensate
 from gcode2krl.errors import RefusedError
@@ -274,13 +273,6 @@ def test_no_piece_of_a_polygon_runs_backwards(head):
     assert share.min() > 0.5
     assert share.max() < 1.6
     assert done.after.rms_mm < 0.4 * done.before.rms_mm
-
-
-def test_a_program_that_would_become_slower_is_refused(head, monkeypatch):
-    """The corrected way is longer than the intended one: here no longer cut is allowed at all."""
-    monkeypatch.setattr(iteration, "MOST_SLOWER", 1.0)
-    with pytest.raises(RefusedError, match="makes the cut last"):
-        corrected(rounding(24, 60.0), head, lambda motion: 2.2 * in_tool(motion))
 
 
 def test_a_turn_on_the_spot_is_refused_in_material_alone(head):
