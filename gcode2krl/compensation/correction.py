@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl import compliance
+from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import to_rest, vectors_turned
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Evaluated, Placed, Ways
 
 SETTLED_MM = 1e-3
@@ -102,8 +104,13 @@ class Contact(NamedTuple):
         near = sample[np.searchsorted((path_mm[1:] + path_mm[:-1]) / 2.0, self.path_mm)]
         motion, joints = evaluated[:2]
         q_rad = interpolated(self.path_mm, path_mm, joints.q_rad[sample]) if turns else joints.q_rad[near]
-        load = (self.force_base_N, self.moment_base_Nmm, np.zeros(3), cell, motion.tool[near])
-        return -compliance.deflection_of(q_rad, *load)[0]
+        load, tool = (self.force_base_N, self.moment_base_Nmm), motion.tool[near]
+        by = to_rest(motion.external[near], cell)
+        if by is None:
+            return -compliance.deflection_of(q_rad, *load, np.zeros(3), cell, tool)[0]
+        turned = (vectors_turned(each, by) for each in load)
+        bent = compliance.deflection_of(q_rad, *turned, np.zeros(3), cell, tool)[0]
+        return -vectors_turned(bent, fr.invert(by))
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""

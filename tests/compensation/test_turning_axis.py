@@ -12,9 +12,11 @@ from gcode2krl.cell.sections import Machine, Tool
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Placed, Ways, deviation_from
 from gcode2krl.compensation.iteration import compensate
 from gcode2krl.errors import RefusedError
-from gcode2krl.gcode import read_stream
+from gcode2krl.gcode import read_gcode, read_stream
 from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
+from tests.cells import over_demonstration
 from tests.compensation.test_iteration import TAIL, stages
+from tests.test_external_axes import ON_TABLE, TABLE, TABLE_MACHINE, cone
 
 HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS8000 M3\nG0 G43 H1 Z60 A0 C0\nG0 X0 Y0\nG0 Z2\n"
 IN_TOOL = np.array([300.0, 450.0, -150.0])
@@ -282,6 +284,20 @@ def test_a_turn_on_the_spot_is_refused_in_material_alone(head):
     assert (caught.value.issues[0].code, caught.value.issues[0].line) == ("axis-turns", 10)
     in_air = "G1 Z-2 F600\nG1 X40 F1500\nG1 Z5\nG1 A10 F600\nG1 Z-2\nG1 X80 F1500\n"
     assert corrected(in_air, head, in_tool)[2].figures["max_correction_mm"] > 0.5
+
+
+@pytest.mark.parametrize("table", [{"follows": "tool"}, {"position": 75.0}])
+def test_a_table_that_turns_the_part_turns_the_force_with_it(tmp_path, table):
+    """What remains is by the deflection of the whole chain, which knows where the table stands."""
+    stated = {"external": {"E2": {**TABLE, **table}}, "frames": {"base": ON_TABLE}, "machine": TABLE_MACHINE}
+    cell = over_demonstration(stated)
+    toolpath = read_gcode(cone(tmp_path), cell)
+    targets = set_targets(toolpath, cell)
+    motion, forces, _ = stages(targets, cell, lambda motion: np.tile(0.5 * IN_TOOL, (len(motion), 1)))
+    done = compensate(toolpath, targets, cell, motion, forces)
+    assert done.figures["change_mm"] <= 1e-3
+    assert done.after.steady_max_mm < 0.03
+    assert done.after.rms_mm < 0.15 * done.before.rms_mm
 
 
 def test_a_compensated_program_verifies(head, tmp_path):
