@@ -3,8 +3,8 @@
 Four programs: the example (a tilted face, the swarf cut of a cone), a slot whose tool leans from one side to
 the other, a ball that nods while its middle goes straight, rings of a dome by a ball with lead. Each row has
 the deviation normal to the feed where the cutter touches the finished part, RMS and largest: without
-compensation, by the online compensator without and with pilot, by axes; and by targets moved offline, with exact
-forces and stiffness. Nothing is judged here.
+compensation, by the online compensator without and with pilot, by axes; and by targets moved offline, with
+exact forces and stiffness. Nothing is judged here.
 
     python benchmarks/five_axis_twin.py            below a minute
     python benchmarks/five_axis_twin.py --small    the slot alone

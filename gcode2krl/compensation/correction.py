@@ -104,12 +104,12 @@ class Contact(NamedTuple):
         near = sample[np.searchsorted((path_mm[1:] + path_mm[:-1]) / 2.0, self.path_mm)]
         motion, joints = evaluated[:2]
         q_rad = interpolated(self.path_mm, path_mm, joints.q_rad[sample]) if turns else joints.q_rad[near]
-        load, tool = (self.force_base_N, self.moment_base_Nmm), motion.tool[near]
+        force, moment, tool = self.force_base_N, self.moment_base_Nmm, motion.tool[near]
         by = to_rest(motion.external[near], cell)
         if by is None:
-            return -compliance.deflection_of(q_rad, *load, np.zeros(3), cell, tool)[0]
-        turned = (vectors_turned(each, by) for each in load)
-        bent = compliance.deflection_of(q_rad, *turned, np.zeros(3), cell, tool)[0]
+            return -compliance.deflection_of(q_rad, force, moment, np.zeros(3), cell, tool)[0]
+        force, moment = vectors_turned(force, by), vectors_turned(moment, by)
+        bent = compliance.deflection_of(q_rad, force, moment, np.zeros(3), cell, tool)[0]
         return -vectors_turned(bent, fr.invert(by))
 
     def air_at(self, path_mm: Floats) -> Floats:

@@ -54,9 +54,11 @@ def touching_of(prediction: Prediction) -> Touching | None:
         row = np.flatnonzero(cuts & (motion.tool == number))
         for r, z, kappa in _outline(cell.tool[number], forces.a_p_mm[row]):
             found += _sides(row, motion.position_mm, axis, velocity, swing, r, z, kappa)
-    touching = Touching(*(np.concatenate(column) for column in zip(*found, strict=True)))
-    on_part = np.abs(left.depths(touching.point_mm)) < _ON_SURFACE_MM
-    return Touching(*(column[on_part] for column in touching))
+    sample = np.concatenate([each.row for each in found])
+    point_mm = np.concatenate([each.point_mm for each in found])
+    normal = np.concatenate([each.normal for each in found])
+    on_part = np.abs(left.depths(point_mm)) < _ON_SURFACE_MM
+    return Touching(sample[on_part], point_mm[on_part], normal[on_part])
 
 
 def _outline(tool: Tool, depth_mm: Floats) -> list[tuple[Floats, Floats, float]]:
