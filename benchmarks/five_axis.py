@@ -42,6 +42,8 @@ STOCK = np.array([[0.0, 0.0, -30.0], [60.0, 50.0, 0.0]])
 F_Z_MM = 0.1
 STEP_MM = 0.3
 """Between two samples: 25 mm/s at 12 ms."""
+HOLLOW = math.sin(math.radians(2.0))
+"""A flat bottom is hollow: what it descends to more gently it does not touch."""
 
 
 class Case(NamedTuple):
@@ -191,12 +193,11 @@ def exact_contact(case, row, fine=4):
     places = case.tip[row] + middle_z[:, None, None] * case.axis[row] + middle_r[:, None, None] * around
     normal = (dz / slant)[:, None, None] * around - (dr / slant)[:, None, None] * case.axis[row]
     before, behind = max(row - 1, 0), min(row + 1, len(case.tip) - 1)
-    moved = (
-        case.tip[behind]
-        - case.tip[before]
-        + middle_z[:, None, None] * (case.axis[behind] - case.axis[before])
-    )
-    into = (normal * moved).sum(axis=2) > 1e-6 * np.linalg.norm(moved, axis=2)
+    turn = np.cross(case.axis[row], case.axis[behind] - case.axis[before])
+    moved = case.tip[behind] - case.tip[before] + np.cross(turn, places - case.tip[row])
+    into = (normal * moved).sum(axis=2) / np.linalg.norm(moved, axis=2)
+    is_bottom = (dz == 0.0)[:, None]
+    into = into > np.where(is_bottom, HOLLOW, 1e-6)
     area = np.broadcast_to((slant * middle_r)[:, None] * math.tau / 120, into.shape)[into]
     places = places[into]
     stands = ((places > STOCK[0]) & (places < STOCK[1])).all(axis=1)

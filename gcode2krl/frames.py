@@ -96,6 +96,19 @@ def angle_between(quaternion_a: ArrayLike, quaternion_b: ArrayLike) -> Floats:
     return angle
 
 
+def turn_between(a: Floats, b: Floats) -> Floats:
+    """Return the rotation vectors (n, 3) in rad from quaternions (n, 4) to others, by the shorter arc.
+
+    `slerp` turns evenly about them: b = exp(vector)·a, along the axes that the quaternions refer to.
+    """
+    scalar = np.sum(a * b, axis=1, keepdims=True)
+    vector = a[:, 3:] * b[:, :3] - b[:, 3:] * a[:, :3] - np.cross(b[:, :3], a[:, :3])
+    vector, scalar = np.where(scalar < 0.0, -vector, vector), np.abs(scalar)
+    sine = np.linalg.norm(vector, axis=1, keepdims=True)
+    turn: Floats = 2.0 * np.arctan2(sine, scalar) / np.where(sine > 0.0, sine, 1.0) * vector
+    return turn
+
+
 def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
     """Return the rotations between quaternions (n, 4) and (n, 4) at fractions (n,), along the shorter arc."""
     b = np.where(np.sum(a * b, axis=1, keepdims=True) < 0, -b, b)

@@ -88,16 +88,40 @@ def test_the_example_is_translated_with_forces(run, tmp_path):
     assert run("verify", "part.src", PART, "--cell", CELL).code == 0
 
 
-def test_no_robot_is_moved_by_forces_of_a_turning_axis(run, tmp_path):
-    done = run(PART, "--cell", CELL, "-o", "part.src")
-    assert "carries no pilot force: the tool axis turns" in done.err
-    assert not (tmp_path / "part.pilot.csv").exists()
-    assert "$SEN_PINT" not in (tmp_path / "part.src").read_text()
-    for asked in (["--pilot", "index"], ["--pilot", "values"], ["--compensate", "offline"]):
-        done = run(PART, "--cell", CELL, "-o", "other.src", *asked)
+@pytest.fixture
+def measured(tmp_path):
+    """The cell of the example, with coefficients whose band lets a robot be moved by them."""
+    cell = tmp_path / "measured.toml"
+    cell.write_text(CELL.read_text() + '\n[material]\nmodel = "AW-2017A"\nrelative_band = 0.15\n')
+    return cell
+
+
+@pytest.mark.parametrize("asked", [["--pilot", "index"], ["--pilot", "values"], ["--compensate", "offline"]])
+def test_a_turning_axis_has_a_pilot_force_and_a_correction(run, tmp_path, measured, asked):
+    done = run(PART, "--cell", measured, "-o", "part.src", *asked)
+    assert done.code == 0, done.err
+    assert "$SEN_P" in (tmp_path / "part.src").read_text()
+    checked = asked if asked[0] == "--compensate" else []
+    assert run("verify", "part.src", PART, "--cell", measured, *checked).code == 0
+
+
+def test_a_wide_band_refuses_the_correction_of_a_turning_axis_too(run, tmp_path):
+    done = run(PART, "--cell", CELL, "-o", "part.src", "--compensate", "offline")
+    assert done.code == 1
+    assert "[compensation-unsure]" in done.err
+    assert not (tmp_path / "part.src").exists()
+
+
+def test_an_edited_correction_is_noticed(run, tmp_path, measured):
+    """Verification reads back positions and orientations of the corrected targets."""
+    run(PART, "--cell", measured, "-o", "part.src", "--compensate", "offline", "--pilot", "none")
+    text = (tmp_path / "part.src").read_text()
+    found = [match for match in LIN.finditer(text) if float(match[2]) > 30.0][5]
+    for group, by in ((1, 0.05), (5, 0.2)):
+        value = f"{float(found[group]) + by:.4f}"
+        (tmp_path / "part.src").write_text(text[: found.start(group)] + value + text[found.end(group) :])
+        done = run("verify", "part.src", PART, "--cell", measured, "--compensate", "offline")
         assert done.code == 1
-        assert "[axis-turns]" in done.err
-        assert not (tmp_path / "other.src").exists()
 
 
 def test_predict_has_forces_and_says_what_is_less_sure():

@@ -12,12 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl import compliance
+from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
+from gcode2krl.cell.carried import to_rest, vectors_turned
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Evaluated, Placed, Ways
 
 SETTLED_MM = 1e-3
 """Change of the targets below which the rounds end; smaller differences are ignored."""
+_COLLINEAR = 1e-7
+"""1 minus the cosine of a turn, 0.03°, up to which two lines are one."""
+_ALONG_OF_WAY = 1.0 / 3.0
+"""Most that two targets come closer or farther, over the way between them."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +95,22 @@ class Contact(NamedTuple):
             forces.moment_base_Nmm[sample],
         )
 
-    def against(self, placed: Placed, evaluated: Evaluated, cell: Cell) -> Floats:
-        """Return minus the deflection (k, 3) at the places, with the arm as at the nearest sample."""
+    def against(self, placed: Placed, evaluated: Evaluated, cell: Cell, turns: bool) -> Floats:
+        """Return minus the deflection (k, 3) at the places, with the arm as at the nearest sample.
+
+        Where the tool ``turns``, as between two: the samples of a round move, and the arm with each.
+        """
         path_mm, sample = placed.distinct()
         near = sample[np.searchsorted((path_mm[1:] + path_mm[:-1]) / 2.0, self.path_mm)]
         motion, joints = evaluated[:2]
-        load = (self.force_base_N, self.moment_base_Nmm, np.zeros(3), cell, motion.tool[near])
-        return -compliance.deflection_of(joints.q_rad[near], *load)[0]
+        q_rad = interpolated(self.path_mm, path_mm, joints.q_rad[sample]) if turns else joints.q_rad[near]
+        force, moment, tool = self.force_base_N, self.moment_base_Nmm, motion.tool[near]
+        by = to_rest(motion.external[near], cell)
+        if by is None:
+            return -compliance.deflection_of(q_rad, force, moment, np.zeros(3), cell, tool)[0]
+        force, moment = vectors_turned(force, by), vectors_turned(moment, by)
+        bent = compliance.deflection_of(q_rad, force, moment, np.zeros(3), cell, tool)[0]
+        return -vectors_turned(bent, fr.invert(by))
 
     def air_at(self, path_mm: Floats) -> Floats:
         """Return the distance (n,) of places to the nearest in air."""
@@ -152,7 +167,7 @@ def wanted_correction(
     divided = ways.begin_mm[before.row] + before.along_mm
     runs = []
     if len(contact.path_mm):
-        against = contact.against(placed, evaluated, cell)
+        against = contact.against(placed, evaluated, cell, bool(ways.turn.any()))
         runs = [_run(ways, first, last, against, contact, divided) for first, last in ways.runs()]
     target_mm = _corners(ways, runs)
     ramped = np.ones(len(contact.path_mm), dtype=np.bool_)
@@ -305,15 +320,33 @@ def _on_curve(ways: Ways, row: Rows, value: Floats, tolerance_mm: float) -> Floa
     """Return the shifts (k, 3) of targets on a curve: normal to it, and along it only what its chords need.
 
     Without its component s along the curve a value misses the normals of the two chords by s·sin(turn/2); as
-    much of s is kept as brings that down to a quarter of the tolerance.
+    much of s is kept as brings that down to a quarter of the tolerance. Where the tool turns, lines are
+    divided by their turn too: at targets between two collinear pieces it changes evenly, and by at most a
+    third of the way, so that no piece runs backwards.
     """
     mean = ways.unit[row] + ways.unit[row + 1]
     normal = compliance.project_normal(value, mean)
     along = value - normal
     missed = np.linalg.norm(along, axis=1) * np.sqrt(np.maximum(1.0 - ways.cos_turn[row], 0.0) / 2.0)
     kept = np.maximum(0.0, 1.0 - tolerance_mm / 4.0 / np.where(missed > 0.0, missed, 1e-9))
+    if ways.turn[row].any():
+        along = _evenly_along(ways, row, along, kept)
+        kept = np.ones(len(row))
     result: Floats = normal + kept[:, None] * along
     return result
+
+
+def _evenly_along(ways: Ways, row: Rows, along: Floats, kept: Floats) -> Floats:
+    """Return how far (k, 3) targets move along a run; where it bends ``kept`` (k,) of ``along`` is wanted."""
+    unit, at_mm = ways.unit[row], ways.end_mm[row]
+    size = np.einsum("ij,ij->i", along, unit)
+    bends = ways.cos_turn[row] < 1.0 - _COLLINEAR
+    amount = np.interp(at_mm, at_mm[bends], (kept * size)[bends]) if bends.any() else np.zeros(len(row))
+    amount = np.clip(amount, -np.abs(size), np.abs(size))
+    room = np.minimum(at_mm - ways.begin_mm[row[0]], ways.end_mm[row[-1] + 1] - at_mm) * _ALONG_OF_WAY
+    amount = np.clip(_no_steeper(at_mm, amount[:, None], _ALONG_OF_WAY)[:, 0], -room, room)
+    share: Floats = (amount / np.where(size == 0.0, 1.0, size))[:, None] * along
+    return share
 
 
 def _on_line(ways: Ways, row: int, run: LineRun, along_mm: Floats) -> Floats:

@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl import compliance
+from gcode2krl import frames as fr
 from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.cell.tool_tips import motion_starts
+from gcode2krl.cutting.milling import tool_axes
 from gcode2krl.program.blending import LEVELS_MM
 from gcode2krl.tables import Deflection, Forces, Joints, Motion, Targets, Toolpath
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
@@ -29,6 +31,7 @@ _LEAST_PIECE_MM = 0.5
 _PLANNED_AHEAD = 3
 """Motions that the controller is assumed to plan ahead where the cell calls it unlimited."""
 _NEWTON_STEPS = 6
+_NO_SWING_RAD = 1e-6
 
 
 class Placed(NamedTuple):
@@ -73,14 +76,19 @@ class Ways:
     source_line: Ints32
     arc: Ints32
     """(p,) number of the arc that each is a chord of, -1 = none."""
+    turn: Floats
+    """(p, 3) rotation vector along ``$BASE`` by which the tool turns on a line, in rad/mm."""
+    middle_mm: Floats
+    """(p,) height of the middle of a ball above its tip; NaN of other tools."""
 
     @classmethod
     def of(cls, toolpath: Toolpath, targets: Targets, cell: Cell) -> "Ways":
         """Return the lines of a program."""
-        start, _ = motion_starts(targets, cell)
+        start, from_rotation = motion_starts(targets, cell)
         way = targets.position_mm - start
         length = np.linalg.norm(way, axis=1)
-        unit = way / np.where(length > 0, length, 1.0)[:, None]
+        size = np.where(length > 0, length, 1.0)[:, None]
+        unit, turn = way / size, _turns(from_rotation, targets.rotation) / size
         move = np.maximum(targets.move, 0)
         cuts = ~targets.ptp & (targets.move >= 0) & (length > 0)
         cuts &= ~toolpath.rapid[move] & ~toolpath.machine[move]
@@ -88,11 +96,12 @@ class Ways:
         follows[1:] = cuts[1:] & cuts[:-1] & (targets.tool[1:] == targets.tool[:-1])
         row_of = np.full(len(toolpath), -1, dtype=np.int64)
         row_of[targets.move[cuts]] = np.flatnonzero(cuts)
-        blend, turn = np.zeros(len(cuts)), np.ones(len(cuts))
+        blend, cos_turn = np.zeros(len(cuts)), np.ones(len(cuts))
         blend[:-1] = np.minimum(targets.cdis_mm[:-1], np.minimum(length[:-1], length[1:]) / 2.0)
         blend[:-1][~follows[1:]] = 0.0
-        turn[:-1] = np.einsum("ij,ij->i", unit[:-1], unit[1:])
-        piece, cdis, slope = _pieces(targets, cell)
+        cos_turn[:-1] = np.einsum("ij,ij->i", unit[:-1], unit[1:])
+        piece, cdis, slope = _pieces(targets, np.linalg.norm(turn, axis=1), cell)
+        balls = {n: tool.diameter_mm / 2.0 for n, tool in cell.tool.items() if tool.kind == "ball"}
         return cls(
             start,
             unit,
@@ -102,12 +111,14 @@ class Ways:
             follows,
             row_of,
             blend,
-            turn,
+            cos_turn,
             piece,
             cdis,
             slope,
             targets.source_line,
             np.where(cuts, toolpath.arc[move], -1),
+            turn,
+            np.array([balls.get(number, np.nan) for number in targets.tool.tolist()]),
         )
 
     @property
@@ -152,22 +163,36 @@ class Ways:
         yield from zip(first.tolist(), ends.tolist(), strict=True)
 
 
-def _pieces(targets: Targets, cell: Cell) -> tuple[Floats, Floats, Floats]:
+def _turns(from_rotation: Floats, to_rotation: Floats) -> Floats:
+    """Return rotation vectors (p, 3) between quaternions; 0 where the tool turns about its axis alone."""
+    turn = fr.turn_between(from_rotation, to_rotation)
+    x, y, z, w = to_rotation.T
+    axis = np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
+    turn[np.linalg.norm(np.cross(turn, axis), axis=1) < _NO_SWING_RAD] = 0.0
+    return turn
+
+
+def _pieces(targets: Targets, turn_per_mm: Floats, cell: Cell) -> tuple[Floats, Floats, Floats]:
     """Return (p,) the shortest piece, its approximation distance, and the steepest correction of each line.
 
     The pieces that the controller plans ahead are together as long as the stopping distance v·(v/a + k)/2, so
     that dividing a line does not slow it down; the approximation at the ends of the line does not change.
-    With an approximation distance d between pieces a kink takes the acceleration v²·angle/(2·d) <= a.
+    With an approximation distance d between pieces a kink takes the acceleration v²·angle/(2·d) <= a. Where
+    the tool turns, the stopping distance is that which the acceleration of its turn needs.
     """
     controller = cell.controller
-    a_mm_s2 = controller.acc_cp_m_s2 * MM_PER_M
-    v = np.nan_to_num(targets.speed_mm_s)
+    a_mm_s2, v = controller.acc_cp_m_s2 * MM_PER_M, np.nan_to_num(targets.speed_mm_s)
+    a_along: float | Floats = a_mm_s2
+    if turn_per_mm.any():
+        mm_per_rad = 1.0 / np.maximum(turn_per_mm, 1e-12)
+        a_along = np.minimum(a_mm_s2, controller.acc_ori_deg_s2 * RAD_PER_DEG * mm_per_rad)
+        v = np.minimum(v, controller.vel_ori_deg_s * RAD_PER_DEG * mm_per_rad)
     ahead = _PLANNED_AHEAD if controller.advance == "unlimited" else int(controller.advance)
     if ahead == 0:  # every target is an exact stop: each piece adds a stop
         return np.full(len(v), np.inf), np.zeros(len(v)), np.full(len(v), MOST_SLOPE)
     reach = np.maximum(targets.cdis_mm, np.append(0.0, targets.cdis_mm[:-1]))
     piece = np.maximum(
-        v * (v / a_mm_s2 + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * reach, _LEAST_PIECE_MM)
+        v * (v / a_along + controller.k_s) / (2.0 * ahead), np.maximum(2.0 * reach, _LEAST_PIECE_MM)
     )
     level = np.searchsorted(LEVELS_MM, piece / 2.0, side="right") - 1
     cdis = LEVELS_MM[level]
@@ -181,7 +206,8 @@ class Deviation:
     intended_mm: Floats
     """(m, 3) nearest point of the intended path, corners blended; off the cutting moves the bent tip."""
     offset_mm: Floats
-    """(m, 3) deflected minus intended, normal to the path; 0 off the cutting moves."""
+    """(m, 3) deflected minus intended, normal to the path; 0 off the cutting moves. Where the tool turns, at
+    the height between tip and depth of cut where it is largest, normal to the way of the edge there."""
     cuts: Bools
     """(m,) True where the tool is loaded on a cutting move."""
     steady: Bools
@@ -217,6 +243,9 @@ def deviation_from(ways: Ways, evaluated: Evaluated, placed: Placed, ramped: Boo
     away = bent - ways.start_mm[row]
     along = np.einsum("ij,ij->i", away, ways.unit[row])
     offset = away - along[:, None] * ways.unit[row]
+    turns = np.flatnonzero((row >= 0) & ways.turn[row].any(axis=1))
+    if len(turns):
+        offset[turns] = _off_edge(ways, evaluated, placed, away, turns)
     in_corner = np.zeros(len(motion), dtype=np.bool_)
     head = np.append(0.0, ways.blend_mm[:-1])[row]
     for vertex, near in ((row, along > ways.length_mm[row] - ways.blend_mm[row]), (row - 1, along < head)):
@@ -227,6 +256,30 @@ def deviation_from(ways: Ways, evaluated: Evaluated, placed: Placed, ramped: Boo
     steady = cuts & ~in_corner & ~ramped & ~motion.corner
     line = np.where(row >= 0, ways.source_line[row], 0).astype(np.int32)
     return Deviation(np.where((row >= 0)[:, None], bent - offset, bent), offset, cuts, steady, line)
+
+
+def _off_edge(ways: Ways, evaluated: Evaluated, placed: Placed, away: Floats, at: Rows) -> Floats:
+    """Return how far the bent edge is off its intended way, (k, 3), at samples ``at`` whose tool turns.
+
+    ``away`` (m, 3) from the start of a line to the bent tip. A place at the height z of the axis moves by
+    u + z·w for a mm of the tip's way, u that of the line and w the turn of the axis: a shift along that
+    leaves the same surface. What is normal to it is taken at the tip, at the depth of cut, and where the
+    shift is all across; of a ball at its middle alone, as its surface moves like that.
+    """
+    row, axis = placed.row[at], tool_axes(evaluated[0])[at]
+    shift = away[at] - (placed.path_mm[at] - ways.begin_mm[row])[:, None] * ways.unit[row]
+    swing = np.cross(ways.turn[row], axis)
+    depth = np.nan_to_num(evaluated[2].a_p_mm[at])
+    across, swung = (np.einsum("ij,ij->i", shift, each) for each in (ways.unit[row], swing))
+    between = np.clip(-across / np.where(swung == 0.0, np.inf, swung), 0.0, depth)
+    middle = ways.middle_mm[row]
+    worst = np.zeros_like(shift)
+    for height in (np.zeros(len(at)), depth, between):
+        height = np.where(np.isnan(middle), height, middle)
+        off = compliance.project_normal(shift, ways.unit[row] + height[:, None] * swing)
+        larger = np.linalg.norm(off, axis=1) > np.linalg.norm(worst, axis=1)
+        worst[larger] = off[larger]
+    return worst
 
 
 def _off_parabola(ways: Ways, vertex: Rows, point: Floats) -> Floats:

@@ -20,7 +20,6 @@ from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.chain import Plan
 from gcode2krl.compensation.correction import SETTLED_MM, Contact, Shift, interpolated, wanted_correction
 from gcode2krl.compensation.intended_path import Deviation, Evaluated, Placed, Ways, deviation_from
-from gcode2krl.cutting.outlook import unproven
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.pipeline import plan_motion
 from gcode2krl.tables import Deflection, Forces, Motion, Targets, Toolpath
@@ -79,14 +78,12 @@ def compensate(
     NotUnderstoodError
         Where the tolerance is not positive.
     RefusedError
-        Where the tool axis turns, the deflection is too unsure (see `refuse_unsure`), a correction is larger
-        than `MOST_CORRECTION_MM`, or the rounds do not settle.
+        Where the deflection is too unsure (see `refuse_unsure`), a correction is larger than
+        `MOST_CORRECTION_MM`, the rounds do not settle, a line would run backwards, or the tool turns on the
+        spot in material.
     """
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise input_error("option-value", f"tolerance {tolerance_mm} mm is not positive", "0.01 is usual")
-    refusal = unproven(targets)
-    if refusal is not None:
-        raise RefusedError(refusal)
     ways = Ways.of(toolpath, targets, cell)
     evaluate = _keeping_forces(ways, targets, motion, forces, cell)
     first = evaluate(targets)
@@ -103,6 +100,8 @@ def compensate(
         change_mm = field.shift.change_mm(shift)
         if change_mm <= SETTLED_MM:
             break
+    _refuse_backwards(plain, moved)
+    _refuse_turns_on_the_spot(targets, ways, shift, motion, forces)
     was = deviation_from(ways, first, before.placed, before.ramped)
     now = deviation_from(ways, evaluated, field.placed, field.ramped)
     issues = (
@@ -231,6 +230,35 @@ def _refuse_large(largest_mm: float, source: str) -> None:
     sentence = f"a correction of {largest_mm:.1f} mm is more than {MOST_CORRECTION_MM:g} mm"
     remedy = "check stiffness and forces"
     raise RefusedError(Issue("error", "compensation-large", 0, sentence, remedy), source)
+
+
+def _refuse_backwards(plain: Targets, moved: Targets) -> None:
+    """Raise where a line runs backwards once its ends are moved."""
+    before, after = (np.diff(each.position_mm, axis=0) for each in (plain, moved))
+    is_lin = ~plain.ptp[1:] & (plain.move[1:] >= 0) & (plain.tool[1:] == plain.tool[:-1])
+    rows = 1 + np.flatnonzero(is_lin & (np.einsum("ij,ij->i", before, after) < 0.0))
+    if not len(rows):
+        return
+    sentence = "the correction moves the ends of this line farther than it is long: it would run backwards"
+    remedy = "let the CAM take longer lines, or take smaller cuts"
+    raise RefusedError(
+        Issue("error", "compensation-large", int(plain.source_line[rows[0]]), sentence, remedy), plain.source
+    )
+
+
+def _refuse_turns_on_the_spot(
+    targets: Targets, ways: Ways, shift: Shift, motion: Motion, forces: Forces
+) -> None:
+    """Raise where the tool turns without a way in a cut, or moved aside: no correction goes with that."""
+    turns = (targets.move >= 0) & ~targets.ptp & (ways.length_mm == 0.0) & ways.turn.any(axis=1)
+    loaded = np.isin(targets.move, motion.move[forces.force_base_N.any(axis=1)])
+    beside = np.append(False, shift.target_mm[:-1].any(axis=1))
+    rows = np.flatnonzero(turns & (loaded | beside))
+    if not len(rows):
+        return
+    sentence = "the tool turns on the spot in material: the correction changes along a way, and there is none"
+    remedy = "turn the tool while it moves, or retract, turn, and enter again"
+    raise RefusedError(Issue("error", "axis-turns", int(targets.source_line[rows[0]]), sentence, remedy))
 
 
 def _settled(change_mm: float, tolerance_mm: float, source: str) -> Iterator[Issue]:

@@ -8,7 +8,7 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.errors import Issue, RefusedError
-from gcode2krl.tables import Motion, Targets
+from gcode2krl.tables import Motion
 
 _SAME_AXIS = 1e-9
 _EVERY = 64
@@ -40,23 +40,6 @@ def axis_changes(what: str) -> RefusedError:
     """Return the refusal of ``what`` needs one tool axis."""
     sentence, remedy = f"the tool axis changes: {what}", "split the program by set-up directions"
     return RefusedError(Issue("error", "axis-changes", 0, sentence, remedy))
-
-
-def unproven(targets: Targets) -> Issue | None:
-    """Return why no robot is moved by predicted forces, None where the tool axis of targets stays.
-
-    Forces of a turning axis were held against solids and against a constant axis, never against a measured
-    cut.
-    """
-    rotation = targets.rotation[targets.move >= 0]
-    if not len(rotation) or not _leaves(rotation, fr.rotation_from_quaternion(rotation[:1])[0][:, 2]):
-        return None
-    sentence = (
-        "the tool axis turns, and forces there were never compared with a measured cut: no robot is moved "
-        "by them"
-    )
-    remedy = "leave out --pilot and --compensate, or split the program by set-up directions"
-    return Issue("error", "axis-turns", 0, sentence, remedy)
 
 
 class Watch:

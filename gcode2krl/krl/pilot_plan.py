@@ -2,7 +2,6 @@
 
 from dataclasses import fields, replace
 
-from gcode2krl.cutting.outlook import unproven
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krl.announce import Form, PilotPlan, Planner, TimedMotions
 from gcode2krl.pilot import Knots
@@ -28,7 +27,7 @@ def plan_pilot(
     """
     outcome: PilotPlan | Issue
     try:
-        outcome = unproven(source.targets) or _fitting(Planner(source, joints, form, sidecar), asked)
+        outcome = _fitting(Planner(source, joints, form, sidecar), asked)
     except RefusedError as error:  # the motion is not that of the targets
         outcome = error.issues[0]
     if not isinstance(outcome, Issue):

@@ -8,6 +8,9 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compiled.inputs import shaped
 from gcode2krl.cutting.law import feed_per_tooth
+from gcode2krl.cutting.milling import tool_axes
+from gcode2krl.cutting.outlook import to_axis, turned
+from gcode2krl.online.touching import Touching, touching_of
 from gcode2krl.prediction import Prediction
 
 SIDE_RAD = 0.05
@@ -28,13 +31,16 @@ class Judged(NamedTuple):
     counts: Bools
     ploughs: Bools
     """The tool sinks so slowly, or did just before, that the predicted force is that of ploughing edges."""
+    touching: Touching | None = None
+    """Where the cutter touches the finished part; None where the tool axis is constant."""
 
 
 def judged(prediction: Prediction, memory_s: float, late_s: float = 0.0) -> Judged:
     """Return where an error of the tip stays on the part.
 
     It stays where an edge passes the side of the cut and makes a wall; at entry and exit of a slot this is
-    where the tool's centre is over the part. It also stays where no other pass goes deeper. Samples with
+    where the tool's centre is over the part. It also stays where no other pass goes deeper. Where the tool
+    axis turns, it stays where the cutter touches the finished part, and no edge ploughs. Samples with
     ploughing edges, and those that a compensator with a memory of ``memory_s`` derives from them, are marked
     separately. If the cutter enters and leaves ``late_s`` later than predicted, the samples shift with it.
     """
@@ -45,19 +51,25 @@ def judged(prediction: Prediction, memory_s: float, late_s: float = 0.0) -> Judg
     with np.errstate(invalid="ignore"):
         side = ((start <= SIDE_RAD) | (end >= np.pi - SIDE_RAD)).any(axis=1)
     cuts = (forces.force_base_N != 0.0).any(axis=1) & side
-    radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
-    stays = cuts & _stays(motion.position_mm, radius, cuts)
+    axis, touching = tool_axes(motion), touching_of(prediction)
+    if touching is None:
+        radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
+        stays = cuts & _stays(turned(motion.position_mm, to_axis(axis[0])), radius, cuts)
+        least = _SINKS
+    else:
+        stays = np.isin(np.arange(len(motion)), touching.row)
+        least = np.inf  # bottoms are hollow there, and touch nothing that they sink to gently
     velocity = np.gradient(motion.position_mm, motion.time_s, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
-    sink = -velocity[:, 2] / np.maximum(speed, 1e-9)
+    sink = -np.einsum("ij,ij->i", velocity, axis) / np.maximum(speed, 1e-9)
     row = np.clip(motion.move, 0, len(prediction.toolpath) - 1)
     teeth = np.array([cell.tool[int(number)].teeth for number in motion.tool])
     chip = sink * feed_per_tooth(speed, prediction.toolpath.spindle_rad_s[row], 1) / teeth
-    ploughing = (forces.force_base_N != 0.0).any(axis=1) & (sink > _SINKS) & (chip < LEAST_CHIP_MM)
+    ploughing = (forces.force_base_N != 0.0).any(axis=1) & (sink > least) & (chip < LEAST_CHIP_MM)
     ploughs = stays & _lasting(ploughing, motion.time_s, memory_s)
     step_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 1.0
     later = round(late_s / step_s)
-    return Judged(_shifted(stays & ~ploughs, later), _shifted(ploughs, later))
+    return Judged(_shifted(stays & ~ploughs, later), _shifted(ploughs, later), touching)
 
 
 def _shifted(where: Bools, samples: int) -> Bools:

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Bools, Floats
 from gcode2krl.online.judge import CELL_MM, SIDE_RAD, Judged, floor_over, grid_of
+from gcode2krl.online.touching import Touching
 from gcode2krl.online.twin import TwinRun
 from gcode2krl.prediction import Prediction
 
@@ -34,13 +35,17 @@ def surface_of(prediction: Prediction, run: TwinRun, judged: Judged) -> Surface:
     """Return how the part that a run leaves differs from the one its commanded path would leave.
 
     The floor is the lowest tip over each cell, of a flat bottom. Walls are where an edge passes the side of
-    the cut, at the tool's radius; the tip's error towards a wall is the excess cut.
+    the cut, at the tool's radius; the tip's error towards a wall is the excess cut. Where the tool axis turns
+    there is no floor: all is points at which the cutter touches the part, with the tip's error along their
+    normals.
     """
     motion, forces, cell = prediction.motion, prediction.forces, prediction.cell
     if motion is None or forces is None:
         raise ValueError("a prediction without forces")
-    cuts = (forces.force_base_N != 0.0).any(axis=1)
     is_judged = judged.counts | judged.ploughs
+    if judged.touching is not None:
+        return _touched(judged.touching, run, is_judged)
+    cuts = (forces.force_base_N != 0.0).any(axis=1)
     radius = np.array([cell.tool[int(number)].diameter_mm / 2.0 for number in motion.tool])
     low, shape = grid_of(motion.position_mm[cuts], radius[cuts])
     nominal = floor_over(motion.position_mm[cuts], radius[cuts], low, shape)
@@ -65,3 +70,12 @@ def surface_of(prediction: Prediction, run: TwinRun, judged: Judged) -> Surface:
         off.append(-np.einsum("ij,ij->i", run.error_mm[rows, :2], normal))
     edges = [low[axis] + CELL_MM * (np.arange(shape[1 - axis] + 1) - 0.5) for axis in (0, 1)]
     return Surface(edges[0], edges[1], floor, np.concatenate(points), np.concatenate(off))
+
+
+def _touched(touching: Touching, run: TwinRun, is_judged: Bools) -> Surface:
+    """Return the deviation at points that touch the part, and a floor of one empty cell."""
+    kept = is_judged[touching.row]
+    point, normal = touching.point_mm[kept], touching.normal[kept]
+    off = -np.einsum("ij,ij->i", run.error_mm[touching.row[kept]], normal)
+    x, y = (np.array([point[:, k].min(initial=0.0), point[:, k].max(initial=1.0)]) for k in (0, 1))
+    return Surface(x, y, np.full((1, 1), np.nan), point, off)

@@ -81,12 +81,15 @@ static void add(double a, double b, const Facet *facet, const double *law, Parts
 }
 
 Facet facet_of(double sin_kappa, double cos_kappa, const Chip *chip) {
-    const double swing = sin_kappa * chip->cos_gamma, offset = cos_kappa * chip->sin_gamma;
+    return facet_at(sin_kappa, cos_kappa, chip->f_z_mm, sin_kappa * chip->cos_gamma, cos_kappa * chip->sin_gamma);
+}
+
+Facet facet_at(double sin_kappa, double cos_kappa, double f_z_mm, double swing, double offset) {
     const bool is_flat = swing < NOT_ENGAGED;
     Facet facet = {.sin_kappa = sin_kappa, .cos_kappa = cos_kappa, .engaged = WHOLE_TURN};
-    facet.swing_mm = is_flat ? 0.0 : chip->f_z_mm * swing;
-    facet.offset_mm = chip->f_z_mm * offset;
-    if (!(chip->f_z_mm > 0.0) || (is_flat ? !(offset > NOT_ENGAGED) : offset <= -swing))
+    facet.swing_mm = is_flat ? 0.0 : f_z_mm * swing;
+    facet.offset_mm = f_z_mm * offset;
+    if (!(f_z_mm > 0.0) || (is_flat ? !(offset > NOT_ENGAGED) : offset <= -swing))
         facet.engaged = NO_CHIP;
     else if (!is_flat && offset < swing) {
         facet.engaged = PART_OF_TURN;

@@ -57,6 +57,9 @@ typedef struct {
 
 Facet facet_of(double sin_kappa, double cos_kappa, const Chip *chip);
 
+/* The same of a chip f_z_mm·(swing·sin phi + offset). */
+Facet facet_at(double sin_kappa, double cos_kappa, double f_z_mm, double swing, double offset);
+
 /* Add the integral over phi, from phi_a to phi_b (at most one turn), of the force on one tooth per mm of
    contact width, N·rad/mm. An empty or NaN arc adds nothing. The contact width is dz/sin kappa; the mean over
    a revolution is teeth/(2·pi)·width times this. law: as `cutting.law.law_array` makes it. */

@@ -2,13 +2,13 @@
 
 The engagement is read at nodes (cutting_mark_turned), before the stock there is cut: the stock lags so far behind the cutter
 that what is in front of the edge is thick. Points of the edge that the cutter has already been at since are found from its
-poses. Each band of the edge has a feed of its own, that of its middle while the tool turns, and the force law of slices.h
-in its own plane of feed and axis. Between two nodes that agree lies what is between theirs, else every sample is read. */
+poses. Each band of the edge has the chip of its own place on a rigid body that turns, and the force law of slices.h. Between two nodes that agree lies what is between theirs, else every sample is read. */
 
 #include "cutting/dexels.h"
 #include "cutting/edge.h"
 
 #define NO_CHIP_SHARE 1e-6  /* chip over feed per tooth below which there is none */
+#define TAN_HOLLOW 0.035    /* of 2 degrees: a mill is hollow below by 1 to 3, and its bottom free of what it descends to gently */
 #define FEEL_OF_NEAR 0.01   /* material that is thinner, as a share of what is near, is rounding */
 #define SAME_COSINE 0.9986  /* of 3 degrees: a way that has turned by less is straight */
 #define LONG_TURN 0.05      /* rad by which the axis turns at most within a step */
@@ -240,24 +240,29 @@ typedef struct {
     const Band *band;
     float *lower, *upper;
     double forward[3], across[3], sine, cosine;
-    Chip chip;
+    double swing, offset, least; /* its chip, swing·sin phi + offset, and the least there is, as shares of the sample's feed */
 } Edge;
 
-/* Write the direction and the size of a band's own feed, as a share of the sample's. */
+/* Write the chip of a band; return false where it has none.
+
+   The tool moves as a rigid body. A point of the edge has the chip n·(v + w x p), n = sin kappa·e - cos kappa·axis, p =
+   z·axis + r·e; with w = axis x turn that is e·(sin kappa·v + (sin kappa·z + cos kappa·r)·turn) - cos kappa·axis·v. So on a
+   ball only the velocity of its middle counts, and on a bottom, which sinks where the tool leans to, the turn alone. */
 static bool set_feed(const Turning *turning, const Place *place, Edge *edge) {
     const double *feed = row3(turning->points->feed_mm, place->i), *swing = row3(turning->points->swing, place->i);
-    const double *axis = place->pose.axis, height = 0.5 * (edge->band->low + edge->band->high);
-    double own[3];
+    const Band *band = edge->band;
+    const double *axis = place->pose.axis, height = 0.5 * (band->low + band->high), radius = 0.5 * (band->r_low + band->r_high);
+    const double lever = band->sin_kappa * height + band->cos_kappa * radius, up = dot3(feed, axis), about = dot3(swing, axis);
     for (int k = 0; k < 3; k++)
-        own[k] = feed[k] + height * swing[k];
-    const double up = dot3(own, axis), size = length3(own);
-    if (!(size > NO_CHIP_SHARE * place->feed_mm))
-        return false;
-    for (int k = 0; k < 3; k++)
-        edge->forward[k] = own[k] - up * axis[k];
+        edge->forward[k] = band->sin_kappa * (feed[k] - up * axis[k]) + lever * (swing[k] - about * axis[k]);
     const double aside = length3(edge->forward);
-    edge->chip = (Chip){size / place->feed_mm, -up / size, aside / size};
-    if (aside > 1e-9 * size)
+    edge->swing = aside / place->feed_mm;
+    edge->offset = -band->cos_kappa * up / place->feed_mm;
+    const double level = sqrt(greater(dot3(feed, feed) - up * up, 0.0)) / place->feed_mm;
+    edge->least = band->sin_kappa > 0.0 ? NO_CHIP_SHARE : greater(NO_CHIP_SHARE, TAN_HOLLOW * level);
+    if (!(edge->swing + edge->offset > edge->least))
+        return false;
+    if (edge->swing > NO_CHIP_SHARE)
         for (int k = 0; k < 3; k++)
             edge->forward[k] /= aside;
     else
@@ -331,15 +336,14 @@ static void add_edge(const Turning *turning, const Place *place, Edge *edge, Con
     const Floats32 turn = turning->work->turn;
     const int64_t bins = AT(turning->cutters->ring_bins, place->tool);
     const double width = band->width, radius = 0.5 * (band->r_low + band->r_high);
-    const Facet facet = facet_of(band->sin_kappa, band->cos_kappa, &edge->chip);
+    const Facet facet = facet_at(band->sin_kappa, band->cos_kappa, 1.0, edge->swing, edge->offset);
     const bool is_linear = turning->law[0] == LAW_LINEAR_EDGE;
-    const double swing = band->sin_kappa * edge->chip.cos_gamma, offset = band->cos_kappa * edge->chip.sin_gamma;
     Integrals sums = {0.0, 0.0, 0.0, 0.0, 0.0};
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
     double engaged = 0.0;
     for (int64_t j = 0; j < bins; j++) {
         const double sine = CELL(turn, RING_SIN, j), cosine = CELL(turn, RING_COS, j);
-        if (!((sine * edge->cosine + cosine * edge->sine) * swing + offset > NO_CHIP_SHARE))
+        if (!((sine * edge->cosine + cosine * edge->sine) * edge->swing + edge->offset > edge->least))
             continue;
         const double share = share_of(turning, place, edge, j);
         if (!(share > 0.0))

@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -268,6 +269,18 @@ def test_a_correction_larger_than_any_robot_bends_is_refused(cell):
     toolpath, targets = read(LINE, cell)
     with pytest.raises(RefusedError, match="compensation-large"):
         corrected(toolpath, targets, cell, lambda motion: 20.0 * constant(motion))
+
+
+def test_a_line_that_would_run_backwards_is_refused(cell):
+    """Corners of 6° are moved along the polygon, the collinear points half way are not."""
+    corner = [30.0 * np.array([np.sin(a), 1.0 - np.cos(a)]) for a in np.radians(6.0 * np.arange(25))]
+    half = [(a + b) / 2.0 for a, b in pairwise(corner)]
+    points = [point for pair in zip(half, corner[1:], strict=True) for point in pair]
+    body = "G1 Z-2 F600\n" + "".join(f"G1 X{x:.4f} Y{y:.4f} F1200\n" for x, y in points)
+    toolpath, targets = read(body, cell)
+    with pytest.raises(RefusedError, match="run backwards") as caught:
+        corrected(toolpath, targets, cell, lambda motion: 2.5 * constant(motion))
+    assert caught.value.issues[0].code == "compensation-large"
 
 
 def test_unsure_deflection_is_refused_wherever_its_numbers_come_from(cell):

@@ -388,6 +388,21 @@ CASES = {
         {"cut": SHALLOW, **machine(compliance={"virtual_joints": STATED})},
         then="compensation-unsettled",
     ),
+    "axis-turns": case(
+        {
+            "words": WET + " --compensate offline",
+            "cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG1 A20\nG1 X40\nG0 Z80\nA0",
+            **machine(
+                compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED},
+                material=MEASURED,
+                controller={"vel_ori_deg_s": 10.0},
+                **FIVE,
+            ),
+        },
+        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG1 X40 A20\nG0 Z80\nA0"},
+        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG0 Z80\nA20\nG1 Z-1 F600\nG1 X40\nG0 Z80\nA0"},
+        says="on the spot",
+    ),
     "compensation-rest": case(
         {
             "words": WET + " --compensate offline",

@@ -185,16 +185,6 @@ CASES = {
         },
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
     ),
-    "axis-turns": case(
-        {
-            "words": "translate part.nc --cell cell.toml --pilot index -o out.src",
-            "cell.toml": FIVE | {"material": {"model": "AW-2017A"}},
-            "cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 A20 X21\nG0 Z80",
-        },
-        {"words": "translate part.nc --cell cell.toml --pilot none -o out.src"},
-        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
-        says="no robot is moved",
-    ),
     # zero points
     "offset-left": case({"cut": "G92 X0\nG1 Z-1 F300\nX30"}, {"tail": ("M30", "G92.1\nM30")}),
     "program-offset": case(
