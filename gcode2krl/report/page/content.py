@@ -31,7 +31,7 @@ from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, sam
 from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.report.part_error import error_on
 from gcode2krl.report.tool_axes import drawn_tools
-from gcode2krl.tables import PartHistory, Toolpath
+from gcode2krl.tables import PartHistory, SurfaceHistory, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 # A mesh with few triangles, to be looked at: what lies in one cell of a grid becomes one corner.
@@ -145,7 +145,7 @@ def content_of(
     stock_mm: Floats | None = None,
     meshes_mm: Mapping[str, Floats] | None = None,
     nominal: dict[str, Any] | None = None,
-    part: PartHistory | None = None,
+    part: PartHistory | SurfaceHistory | None = None,
 ) -> Content:
     """Return the page of a prediction.
 
@@ -318,13 +318,15 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples)
 
 def _with_part(
     content: Content,
-    part: PartHistory,
+    part: PartHistory | SurfaceHistory,
     prediction: Prediction,
     whole: PageSamples,
     nominal: dict[str, Any] | None,
 ) -> Content:
     """Return a page with the part as it is cut."""
-    above_mm = None if nominal is None else worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
+    above_mm = None
+    if nominal is not None and isinstance(part, PartHistory):
+        above_mm = worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
     head, events, cells = drawn_part(part, thinned(whole), error_on(part, prediction), above_mm)
     return replace(content, head=content.head | {"part": head}, part=events, part_cells=cells)
 
