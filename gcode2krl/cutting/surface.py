@@ -25,7 +25,7 @@ class Surface(NamedTuple):
     shape: Ints32
     """Cubes between eight middles: three bytes of the point of the surface, above them its state; 0 = none."""
     facing: Ints32
-    """Packed normal of what was cut last in a cube."""
+    """Packed normal of what was cut in a cube."""
     point: Ints32
     """The point of the path that cut it, -1 where none did,"""
     left: Ints32

@@ -48,7 +48,9 @@ static inline double unpacked(int32_t facing, int k) {
     return (double)(int8_t)((uint32_t)facing >> (8 * k)) / TD_SHORTENED;
 }
 static inline int32_t stamp_of(int32_t facing) { return (int32_t)((uint32_t)facing >> 24); }
-static inline int32_t without_stamp(int32_t facing) { return (int32_t)((uint32_t)facing & 0xffffff); }
+static inline int32_t with_stamp(int32_t facing, int32_t stamp) {
+    return (int32_t)(((uint32_t)facing & 0xffffff) | (uint32_t)stamp << 24);
+}
 
 /* Return the pose at a share of a step. */
 Pose pose_at(const Step *step, double share);

@@ -4,7 +4,7 @@ Eight neighbouring middles of cells are a cube; one layer of middles is around t
 three rays say so. A cube whose middles are not alike has one point of the surface, where the planes of the ends on its edges
 meet best (dual contouring, Ju et al. 2002), so that edges of the part stay sharp. The four cubes round an edge from a solid
 middle to another one make a square. What happens to a cube within one slot of time is one event, by the last point of the path
-that left an end there: it is known by the stamps on the ends, which are taken away at the end of a slot. */
+that left an end there: it is known by the stamps on the ends. At the end of a slot they all become the same one. */
 
 #include <stdlib.h>
 
@@ -14,7 +14,7 @@ that left an end there: it is known by the stamps on the ends, which are taken a
 #define NEAR_CELLS 1e-3 /* an end that lies so far beyond an edge is on it */
 
 /* A point that moves by fewer shares of its cube is not what a later pass left: swept surfaces are known to 2 % of a cell. */
-enum { STAMPS = 255, SHARES = 255, MOVED = 13, HAS_POINT = 16, MOST_ENDS = 12 };
+enum { OF_RAW = 0, OF_EARLIER = 1, STAMPS = 254, SHARES = 255, MOVED = 13, HAS_POINT = 16, MOST_ENDS = 12 };
 
 /* Events that have been written. */
 typedef struct {
@@ -85,7 +85,7 @@ static End end_on(const Dexels *stock, int axis, const int64_t *middle, bool is_
         if (CELL(stock->ends, ray, k) < low || CELL(stock->ends, ray, k) > high)
             continue;
         end.place[axis] = CELL(stock->ends, ray, k);
-        end.facing = without_stamp(CELL(stock->facing, ray, k));
+        end.facing = CELL(stock->facing, ray, k);
         end.stamp = stamp_of(CELL(stock->facing, ray, k));
         for (int m = 0; m < 3; m++)
             end.normal[m] = unpacked(end.facing, m);
@@ -118,6 +118,22 @@ static void meet(const End *ends, int count, double *place) {
         place[k] = mean[k] + dot3(inverse[k], right) / determinant;
 }
 
+/* Return the normal of the end that was cut and is most like all others: the end of a step may be on the front of a cutter. */
+static int32_t usual_facing(const End *ends, int count) {
+    int32_t facing = 0;
+    double most_alike = -INFINITY;
+    for (int n = 0; n < count; n++) {
+        double alike = 0.0;
+        for (int m = 0; m < count; m++)
+            alike += ends[m].stamp == OF_RAW ? 0.0 : dot3(ends[n].normal, ends[m].normal);
+        if (ends[n].stamp != OF_RAW && alike > most_alike) {
+            most_alike = alike;
+            facing = ends[n].facing;
+        }
+    }
+    return facing;
+}
+
 /* Tell whether two shapes of a cube are nearly the same. */
 static bool are_alike(int32_t a, int32_t b) {
     for (int shift = 0; shift < 24; shift += 8)
@@ -138,7 +154,7 @@ static bool renew_cube(const Dexels *stock, const Surface *surface, const int64_
             state |= corner == 0 ? 1 : corner << 1;
     }
     const int64_t number = number_of(stock, cube, 1);
-    int32_t *shape = &AT(surface->shape, number), before = *shape, latest = 0;
+    int32_t *shape = &AT(surface->shape, number), before = *shape, latest = OF_EARLIER;
     *shape = 0;
     if (solids == 0 || solids == 8)
         return before != 0;
@@ -161,27 +177,28 @@ static bool renew_cube(const Dexels *stock, const Surface *surface, const int64_
         *shape |= (int32_t)lrint(SHARES * clamped(share, 0.0, 1.0)) << (8 * k);
     }
     *shape |= state << 24;
-    for (int n = 0; n < count; n++) {
-        if (ends[n].stamp <= latest)
-            continue;
-        latest = ends[n].stamp;
-        AT(surface->facing, number) = ends[n].facing;
-    }
-    if (latest > 0 && !are_alike(*shape, AT(surface->left, number))) {
-        AT(surface->point, number) = (int32_t)(point + (latest - 1) * stride);
+    for (int n = 0; n < count; n++)
+        latest = ends[n].stamp > latest ? ends[n].stamp : latest;
+    AT(surface->facing, number) = usual_facing(ends, count);
+    if (latest > OF_EARLIER && !are_alike(*shape, AT(surface->left, number))) {
+        AT(surface->point, number) = (int32_t)(point + (latest - OF_EARLIER - 1) * stride);
         AT(surface->left, number) = *shape;
     }
     return *shape != before;
 }
 
-static void take_stamps(const Dexels *stock, const Range *range) {
+/* Turn the stamps of a slot into that of an earlier one. */
+static void age_stamps(const Dexels *stock, const Range *range) {
     for (int axis = 0; axis < 3; axis++) {
         const Field field = field_of(stock, axis);
         for (int64_t v = most(range->first[field.v] - 1, 0); v < least(range->last[field.v] + 1, field.rows); v++)
             for (int64_t u = most(range->first[field.u] - 1, 0); u < least(range->last[field.u] + 1, field.columns); u++) {
                 const int64_t ray = field.first + v * field.columns + u;
-                for (int64_t k = 0; k < 2 * AT(stock->filled, ray); k++)
-                    CELL(stock->facing, ray, k) = without_stamp(CELL(stock->facing, ray, k));
+                for (int64_t k = 0; k < 2 * AT(stock->filled, ray); k++) {
+                    int32_t *facing = &CELL(stock->facing, ray, k);
+                    if (stamp_of(*facing) != OF_RAW)
+                        *facing = with_stamp(*facing, OF_EARLIER);
+                }
             }
     }
 }
@@ -202,7 +219,7 @@ static void renew(const Dexels *stock, const Surface *surface, const Range *rang
                 AT(events->shape, events->count) = AT(surface->shape, number);
                 AT(events->point, events->count++) = AT(surface->point, number);
             }
-    take_stamps(stock, range);
+    age_stamps(stock, range);
 }
 
 /* Return the cubes that the way between points can change; none where first is behind last. */
@@ -261,7 +278,7 @@ EXPORT int64_t cutting_surface(const Dexels *stock, const Turned *points, Ints32
         double removed_mm[3] = {0.0, 0.0, 0.0};
         for (int64_t k = most(begin, 1); k < after && !AT(done, 1); k++)
             if (!AT(points->first, k))
-                AT(done, 1) = !cut_way(stock, points, k - 1, k, (int32_t)(1 + (k - begin) / stride), removed_mm);
+                AT(done, 1) = !cut_way(stock, points, k - 1, k, (int32_t)(OF_EARLIER + 1 + (k - begin) / stride), removed_mm);
         if (removed_mm[0] + removed_mm[1] + removed_mm[2] > 0.0)
             renew(stock, surface, &range, AT(slot_of, begin), begin, stride, &events);
     }
