@@ -5,7 +5,7 @@ class Heights {
     const { cells: [width, depth], low, size, bottom } = head.part;
     Object.assign(this, { width, depth, low, size, bottom, cell, height, raw, count: width * depth });
     this.heights = Float32Array.from(raw);
-    this.cut = [Infinity, Infinity, Infinity];
+    this.cut = [...WHOLE];
     // vertices are cells, with two more around: the edge of the stock, and its foot
     const vertices = (width + 4) * (depth + 4);
     this.points = new Float32Array(3 * vertices);
@@ -37,13 +37,16 @@ class Heights {
       if (i <= 0 || j <= 0 || i >= width + 3 || j >= depth + 3) return bottom;
       return heights[Math.min(Math.max(j - 2, 0), depth - 1) * width + Math.min(Math.max(i - 2, 0), width - 1)];
     };
-    const share = (places, k, end) => Math.max((end - places[k - 1]) / Math.max(places[k] - places[k - 1], 1e-6), 0);
+    const share = (places, k, beside, end) => {
+      const size = (places[k] ?? end) - (places[beside] ?? end);
+      return Math.abs(size) < 1e-6 ? 0 : Math.max((end - places[beside]) / size, 0);
+    };
     for (let j = 0, n = 0; j < depth + 4; j++) {
       for (let i = 0; i < across; i++) {
-        const overX = x[i] > cut[0], overY = y[j] > cut[1];
+        const overX = x[i] > cut[0], overY = y[j] < cut[1];
         let z = height(i, j);
-        if (overX) { const part = share(x, i, cut[0]); z = part > 0 ? part * z + (1 - part) * height(i - 1, j) : bottom; }
-        if (overY) { const part = share(y, j, cut[1]); z = part > 0 ? part * z + (1 - part) * height(i, j - 1) : bottom; }
+        if (overX) { const part = share(x, i, i - 1, cut[0]); z = part > 0 ? part * z + (1 - part) * height(i - 1, j) : bottom; }
+        if (overY) { const part = share(y, j, j + 1, cut[1]); z = part > 0 ? part * z + (1 - part) * height(i, j + 1) : bottom; }
         points[n++] = overX ? cut[0] : x[i];
         points[n++] = overY ? cut[1] : y[j];
         points[n++] = Math.min(z, cut[2]);
@@ -72,7 +75,8 @@ class Heights {
   // The cell at which a ray enters the part, -1 beside it.
   under(ray) {
     const { ends } = this;
-    const box = new THREE.Box3(new THREE.Vector3(...ends.map(([low]) => low)), new THREE.Vector3(...ends.map(([, high], k) => Math.min(high, this.cut[k]))));
+    const low = ends.map(([end], k) => (k === 1 ? Math.max(end, this.cut[k]) : end)), high = ends.map(([, end], k) => (k === 1 ? end : Math.min(end, this.cut[k])));
+    const box = new THREE.Box3(new THREE.Vector3(...low), new THREE.Vector3(...high));
     const enters = ray.intersectBox(box, new THREE.Vector3());
     if (!enters) return -1;
     const step = Math.min(...this.size) / 3, way = ray.direction, at = enters.addScaledVector(way, 1e-4);

@@ -1,6 +1,7 @@
 // The part as it stands at a row: cut by the core, in cells that became otherwise at rows; drawn by the shader.
 
 const MOVING_TRIANGLES = 12000;  // while something moves and a processor draws
+const WHOLE = [1e9, -1e9, 1e9];  // a section leaves what is below in x and z, and above in y: where the usual view looks at it
 const UNCUT = [205, 192, 160], CUT = [196, 203, 210], NOT_YET = [222, 226, 230], NOT_KNOWN = [150, 158, 166];
 const OFF = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"];  // blue: too much is cut
 const PART_WORDS = { error: "error by deflection (mm)", nominal: "above the nominal part (mm)", force: "force (N)", tool: "tool", plain: "" };
@@ -25,9 +26,9 @@ void main() {
   vec3 gap = abs(place - cut), at = place;
   bool isCut = (gap.x < fine && abs(side.x) > 0.9) || (gap.y < fine && abs(side.y) > 0.9) || (gap.z < fine && abs(side.z) > 0.9);
   if (isClosed) {  // who sees it from inside looks through the section
-    if (any(greaterThan(place, cut))) discard;
+    if (place.x > cut.x || place.y < cut.y || place.z > cut.z) discard;
     isCut = !gl_FrontFacing;
-    for (int k = 0; k < 3; k++) if (isCut && cut[k] < 1e8) at = mix(cameraPosition, place, (cut[k] - cameraPosition[k]) / (place[k] - cameraPosition[k]));
+    for (int k = 0; k < 3; k++) if (isCut && abs(cut[k]) < 1e8) at = mix(cameraPosition, place, (cut[k] - cameraPosition[k]) / (place[k] - cameraPosition[k]));
   }
   float stripe = mod(at.x + at.y + at.z, 40.0 * fine) < 12.0 * fine ? 0.62 : 0.74;
   float light = 0.58 + 0.42 * max(dot(normal, normalize(vec3(-1.0, -2.0, 3.0))), 0.0);
@@ -70,7 +71,7 @@ class Part {
         foot: { value: shape.foot },
         fine: { value: span / 4000 },
         isClosed: { value: Boolean(head.part.cubes) },
-        cut: { value: new THREE.Vector3(1e9, 1e9, 1e9) },
+        cut: { value: new THREE.Vector3(...WHOLE) },
       },
     });
     this.mesh = new THREE.Mesh(shape.fine, this.material);
@@ -100,12 +101,12 @@ class Part {
     byId("play").addEventListener("click", follow, true);
   }
 
-  // Show the part cut off behind a share of its size along an axis; -1 shows it whole.
+  // Show the part cut off at a share of its size along an axis; -1 shows it whole.
   section(axis, share) {
     const { ends, cut } = this.shape;
-    cut.fill(Infinity);
+    WHOLE.forEach((place, k) => { cut[k] = place; });
     if (axis >= 0) cut[axis] = ends[axis][0] + share * (ends[axis][1] - ends[axis][0]);
-    this.material.uniforms.cut.value.set(...cut.map((place) => Math.min(place, 1e9)));
+    this.material.uniforms.cut.value.set(...cut);
     this.shape.place();
     this.page.scene.changed(false);
   }

@@ -9,7 +9,7 @@ class Surface {
     this.corner = Array.from({ length: 3 }, (_, k) => Int32Array.from(cube, (one) => Math.floor(one / this.strides[k]) % [width, depth, height][k]));
     this.ends = [width, depth, height].map((many, k) => [low[k] + 0.5 * size[k], low[k] + (many - 0.5) * size[k]]);
     this.foot = -1e9;
-    this.cut = [Infinity, Infinity, Infinity];
+    this.cut = [...WHOLE];
     this.makeSquares(cube, width * depth * height);
     this.states = new Uint8Array(count);
     this.points = new Float32Array(3 * count);
@@ -134,7 +134,7 @@ class Surface {
     const caster = new THREE.Raycaster(ray.origin, ray.direction), shape = this.detail(true);
     shape.boundingSphere = new THREE.Sphere(new THREE.Vector3(), Infinity);
     const mesh = new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
-    const hit = caster.intersectObject(mesh).find(({ point }) => point.toArray().every((at, k) => at <= this.cut[k]));
+    const hit = caster.intersectObject(mesh).find(({ point }) => point.x <= this.cut[0] && point.y >= this.cut[1] && point.z <= this.cut[2]);
     if (!hit || hit.face.normal.dot(ray.direction) > 0) return -1;
     const away = (place) => hit.point.distanceToSquared(new THREE.Vector3().fromArray(this.points, 3 * place));
     return [hit.face.a, hit.face.b, hit.face.c].reduce((best, one) => (away(one) < away(best) ? one : best));
