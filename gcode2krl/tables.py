@@ -474,7 +474,7 @@ class PartHistory(NamedTuple):
 
 
 class SurfaceHistory(NamedTuple):
-    """How a part comes about under a tool whose axis turns: a surface through cubes of a lattice in ``$BASE``.
+    """How a part comes about under a tool whose axis turns: a surface through cubes in ``$BASE``.
 
     A cube has one point of the surface or none. The four cubes round an edge that leads out of the material
     make a square.
@@ -491,13 +491,13 @@ class SurfaceHistory(NamedTuple):
     cell: Ints32
     """(e,) events in the order of time: a site became otherwise; first those of the raw part,"""
     shown: NDArray[np.int64]
-    """(e,) as it is from this row of the Motion on, -1 in the raw part; rows are such that no square is torn,"""
+    """(e,) as it is from this row of the Motion on, -1 in the raw part; no square is torn at any row,"""
     sample: NDArray[np.int64]
     """(e,) by this row of the Motion, -1 for none,"""
     share: NDArray[np.uint8]
     """(e, 3) to a point at these 255ths of the cube,"""
     state: NDArray[np.uint8]
-    """(e,) with the material at its low corner (1) and beyond along x, y, z (2, 4, 8); 0 = it has no point."""
+    """(e,) with material at its low corner (1) and beyond it along x, y, z (2, 4, 8); 0 = without a point."""
     left_by: NDArray[np.int64]
     """(s,) the row of the Motion that left the finished surface, -1 where nothing was cut or none is."""
     normal: Floats
@@ -512,8 +512,7 @@ class SurfaceHistory(NamedTuple):
         last = np.full(len(self.site), -1)
         last[self.cell[:done]] = np.arange(done)  # of several the last one counts
         state = np.where(last >= 0, self.state[last], 0)
-        x, y, z = self.site % self.cubes[0], self.site // self.cubes[0] % self.cubes[1], self.site
-        corner = np.stack([x, y, z // (self.cubes[0] * self.cubes[1])], axis=1)
+        corner = np.stack(np.unravel_index(self.site, self.cubes[::-1])[::-1], axis=1)
         points: Floats = self.low_mm + (corner + self.share[last] / 255.0) * self.cell_mm
         strides = np.array([1, self.cubes[0], self.cubes[0] * self.cubes[1]])
         squares = []

@@ -80,16 +80,17 @@ def dexels_of(
     stock, smallest_mm = cell.stock, min(tool.diameter_mm for tool in tools)
     own_mm = stock.resolution_mm if stock is not None else None
     mesh = load_mesh(Path(stock.mesh)) if stock is not None and stock.mesh is not None else None
-    is_guessed = stock is None or (mesh is None and stock.box_mm is None)
-    if is_guessed:
+    stated_mm = stock.box_mm if stock is not None and mesh is None else None
+    if mesh is not None or stated_mm is not None:
+        box_mm = np.array(stated_mm if mesh is None else mesh.bounds)
+    else:
         radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
         box_mm = guessed_box(toolpath, np.eye(3), radius_mm, edges_mm)
-    else:
-        box_mm = np.array(mesh.bounds if mesh is not None else stock.box_mm)
     cell_mm = own_mm if own_mm is not None else smallest_mm / DEXELS_PER_DIAMETER
     if most_squares is not None:
         x, y, z = box_mm[1] - box_mm[0]
         cell_mm = max(cell_mm, math.sqrt(2.0 * (x * y + y * z + z * x) / most_squares))
+    is_guessed = mesh is None and stated_mm is None
     return (dexel_block(box_mm, cell_mm) if mesh is None else dexel_mesh(mesh, cell_mm)), is_guessed
 
 

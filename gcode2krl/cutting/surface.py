@@ -1,4 +1,4 @@
-"""How a part comes about under a tool whose axis turns, coarse enough to be shown: `history` in any direction."""
+"""How a part comes about under a tool whose axis turns, coarse enough to be shown; `history` of any axis."""
 
 import math
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Surface(NamedTuple):
     solid: Bools
     """Middles of cells, and one layer around them, with material."""
     shape: Ints32
-    """Cubes between eight middles: three bytes of the point of the surface, above them its state; 0 = none."""
+    """Cubes between eight middles: three bytes of the point of the surface, above its state; 0 = none."""
     facing: Ints32
     """Packed normal of what was cut in a cube."""
     point: Ints32
@@ -35,9 +35,7 @@ class Surface(NamedTuple):
 SURFACE = StructOf.record(Surface, written=Surface._fields)
 _EVENTS = (OUT_INTS32,) * 4
 _raw = core_function("cutting_raw_surface", DEXELS, SURFACE, *_EVENTS, returns=INT)
-_cut = core_function(
-    "cutting_surface", DEXELS, TURNED, INTS32, INT, SURFACE, *_EVENTS, OUT_INTS, returns=INT
-)
+_cut = core_function("cutting_surface", DEXELS, TURNED, INTS32, INT, SURFACE, *_EVENTS, OUT_INTS, returns=INT)
 
 
 class _Events(NamedTuple):
@@ -72,7 +70,9 @@ def surface_history(
     events, surface = _cut_out(raw, points, slot)
     events, length = _fewer(events, most[1])
     slot //= length
-    ends = np.append(np.flatnonzero(np.diff(slot)), len(slot) - 1)  # the last point of each slot that there is
+    ends = np.append(
+        np.flatnonzero(np.diff(slot)), len(slot) - 1
+    )  # the last point of each slot that there is
     state = events.shape >> 24
     site = np.unique(events.cube[state > 0])
     left_by, packed = surface.point[site], surface.facing[site]
@@ -145,7 +145,7 @@ def _written(events: _Events, count: int) -> _Events:
 
 
 def _fewer(events: _Events, most: int) -> tuple[_Events, int]:
-    """Return at most so many events, and how many slots are one for that; what comes and goes in one is none."""
+    """Return at most so many events, and how many slots are one for that."""
     length = 1
     while True:
         slot = events.slot // length

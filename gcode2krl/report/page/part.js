@@ -95,8 +95,16 @@ class Part {
     };
     axis.addEventListener("change", section);
     depth.addEventListener("input", section);
-    // whoever moves in time wants to see the part at that time
-    const follow = () => { byId("show-finished").checked = false; };
+    // whoever moves in time wants to see the part at that time, and the robot, which hides the finished part
+    const robot = byId("show-robot");
+    let isFirst = true;
+    robot.checked = false;
+    if (page.robot) page.robot.wanted = false;
+    robot.addEventListener("change", () => { isFirst = false; });
+    const follow = () => {
+      byId("show-finished").checked = false;
+      if (isFirst && !robot.checked) robot.click();
+    };
     byId("slider").addEventListener("input", follow, true);
     byId("play").addEventListener("click", follow, true);
   }

@@ -15,7 +15,7 @@ class Scene {
     this.columns = columns;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware(), preserveDrawingBuffer: false });
     this.software = isSoftware();
-    this.renderer.setClearColor(0xf4f6f8);
+    this.renderer.setClearColor(0xe8ecf0);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 1, 1e5);
     this.camera.up.set(0, 0, 1);
