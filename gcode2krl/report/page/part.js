@@ -103,7 +103,8 @@ class Part {
     robot.addEventListener("change", () => { isFirst = false; });
     const follow = () => {
       byId("show-finished").checked = false;
-      if (isFirst && !robot.checked) robot.click();
+      if (isFirst && page.robot) robot.checked = page.robot.wanted = true;
+      isFirst = false;
     };
     byId("slider").addEventListener("input", follow, true);
     byId("play").addEventListener("click", follow, true);
@@ -183,15 +184,18 @@ class Part {
     }
     byId("part-low").textContent = end ? `-${rounded(end)} too much` : scale ? rounded(scale.low) : "";
     byId("part-high").textContent = end ? `left +${rounded(end)}` : scale ? rounded(scale.high) : "";
-    byId("part-tools").replaceChildren(...(quantity === "tool" ? head.tools : []).map((tool, k) => {
+    const shown = quantity === "tool" ? head.tools.map((tool, k) => [PASS_COLOURS[k % PASS_COLOURS.length], `T${tool}`]) : [];
+    shown.push([cssOf(UNCUT), "not cut"]);
+    if (end && !this.isFinished) shown.push([cssOf(NOT_YET), "cut again later"]);
+    byId("part-tools").replaceChildren(...shown.map(([colour, words]) => {
       const item = document.createElement("span"), swatch = item.appendChild(document.createElement("b"));
       swatch.className = "swatch";
-      swatch.style.background = PASS_COLOURS[k % PASS_COLOURS.length];
-      item.append(`T${tool} `);
+      swatch.style.background = colour;
+      item.append(`${words} `);
       return item;
     }));
     const stands = this.volume();
-    byId("part-volume").textContent = `${rounded(stands / 1000)} cm³ stand, ${rounded((this.shape.rawVolume - stands) / 1000)} cm³ are cut`;
+    byId("part-volume").textContent = `${rounded(stands / 1000)} cm³ stand, ${rounded((this.shape.rawVolume - stands) / 1000)} cm³ cut`;
   }
 
   // mm³ of what stands.
@@ -227,5 +231,7 @@ class Part {
 }
 
 const signed = (value) => (Number.isFinite(value) ? `${value < 0 ? "-" : "+"}${Math.abs(value).toFixed(3)}` : "not known");
+
+const cssOf = (colour) => `rgb(${colour})`;
 
 const tableOf = (palette) => Array.from({ length: 256 }, (_, k) => mixed(palette, k / 255, 0));
