@@ -2,6 +2,7 @@
 
 const MOVING_TRIANGLES = 12000;  // while something moves and a processor draws
 const WHOLE = [1e9, -1e9, 1e9];  // a section leaves what is below in x and z, and above in y: where the usual view looks at it
+const NEARLY_ALL_CUT = 0.05;  // what stands, of the raw part: then there is little to be seen but the path
 const UNCUT = [205, 192, 160], CUT = [196, 203, 210], NOT_YET = [222, 226, 230], NOT_KNOWN = [150, 158, 166];
 const OFF = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"];  // blue: too much is cut
 const PART_WORDS = { error: "error by deflection (mm)", nominal: "above the nominal part (mm)", force: "force (N)", tool: "tool", plain: "" };
@@ -47,6 +48,8 @@ class Part {
     this.done = 0;
     this.makeMesh();
     this.wire();
+    this.cutUpTo(this.order.length);
+    if (this.volume() < NEARLY_ALL_CUT * this.shape.rawVolume) byId("show-path").checked = true;
   }
 
   // Events by row, and how many there are up to each.

@@ -123,6 +123,19 @@ def test_it_follows_the_slider_in_both_directions(window, history):
 
 
 @pytest.mark.browser
+def test_who_moves_the_slider_sees_part_and_robot_there(window):
+    window.evaluate(FINISHED, True)
+    assert not window.evaluate("report.robot.root.visible")
+    window.locator("#slider").fill("3000")
+    assert window.evaluate("report.row") == 3000
+    assert window.evaluate("report.robot.root.visible")
+    assert not window.locator("#show-finished").is_checked()
+    window.locator("#show-robot").uncheck()
+    window.locator("#slider").fill("2000")
+    assert not window.evaluate("report.robot.root.visible")
+
+
+@pytest.mark.browser
 def test_a_click_says_which_line_left_the_surface(window, prediction):
     """In the middle of the slot of line 26, at Y -50."""
     window.evaluate(FINISHED, True)
