@@ -72,6 +72,17 @@ def test_it_carries_every_event_and_the_error(prediction, history, content):
     assert error == pytest.approx(error_on(history, prediction).ravel(), abs=6e-4, nan_ok=True)
 
 
+def test_a_page_that_would_be_too_large_draws_fewer_samples(prediction, history, content, monkeypatch):
+    monkeypatch.setattr("gcode2krl.report.page.content.MOST_DATA", len(content.data) - 1)
+    fewer = content_of(prediction, part=history)
+    assert fewer.head["all"] == content.head["all"]
+    assert fewer.head["rows"] <= content.head["rows"] // 2
+    assert len(fewer.data) < 0.8 * len(content.data)
+    events = fewer.head["part"]["events"]
+    row = column(fewer.part, events["columns"], "row", events["rows"])
+    assert row.max() < fewer.head["rows"]
+
+
 def test_a_page_without_a_cut_carries_no_part(prediction):
     made = page(content_of(replace(prediction, forces=None, deflection=None)))
     assert part_of(replace(prediction, forces=None)) is None
