@@ -24,6 +24,7 @@ class Surface {
     this.stride = software ? Math.ceil(Math.sqrt((2 * raw) / MOVING_TRIANGLES)) : 1;
     this.fine = shape();
     this.coarse = this.stride > 1 ? shape() : this.fine;
+    if (this.stride > 1) this.makeParents();
     for (let event = 0; event < raw; event++) this.apply(event);
     this.rawVolume = this.volume();
     this.reset();
@@ -78,14 +79,25 @@ class Surface {
     return isFine ? this.fine : this.coarse;
   }
 
-  // For each place one that stands for it: the first with a point of several cubes that are one.
+  // Number the larger cubes of which each holds some places.
+  makeParents() {
+    const numbers = new Map();
+    this.parent = Int32Array.from({ length: this.count }, (_, place) => {
+      const [i, j, k] = this.corner.map((one) => Math.floor(one[place] / this.stride)), key = i + 4096 * (j + 4096 * k);
+      if (!numbers.has(key)) numbers.set(key, numbers.size);
+      return numbers.get(key);
+    });
+    this.first = new Int32Array(numbers.size);
+  }
+
+  // For each place the one that stands for it: the first with a point in the larger cube.
   nearby() {
-    const { states, corner, count, stride } = this, first = new Map(), stands = new Int32Array(count);
+    const { states, parent, first, count } = this, stands = new Int32Array(count);
+    first.fill(-1);
     for (let place = 0; place < count; place++) {
       if (!states[place]) continue;
-      const [i, j, k] = corner.map((one) => Math.floor(one[place] / stride)), key = i + 2048 * (j + 2048 * k);
-      if (!first.has(key)) first.set(key, place);
-      stands[place] = first.get(key);
+      if (first[parent[place]] < 0) first[parent[place]] = place;
+      stands[place] = first[parent[place]];
     }
     return stands;
   }
