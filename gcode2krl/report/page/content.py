@@ -19,6 +19,7 @@ from gcode2krl.report.page.losses import (
     NotableSample,
     Window,
     is_worth_saying,
+    lost_parts,
     lost_time,
     time_shares,
     worst_places,
@@ -123,6 +124,9 @@ class Content:
     facts: list[tuple[str, str]] = field(default_factory=list)
     shares: list[tuple[str, float]] = field(default_factory=list)
     lost_s: float = 0.0
+    lost_parts: list[tuple[str, float]] = field(default_factory=list)
+    is_slow: bool = False
+    """True where so much time is lost that it is worth a word."""
     windows: list[Window] = field(default_factory=list)
     worst: list[Worst] = field(default_factory=list)
     told: Told = field(default_factory=lambda: told(()))
@@ -255,6 +259,8 @@ def _content(
         facts=facts,
         shares=time_shares(whole.time_s, whole.speed_mm_s, whole.rapid, whole.cutting) if is_timed else [],
         lost_s=lost_whole_s,
+        lost_parts=lost_parts(lost_s, whole.speed_mm_s) if is_timed else [],
+        is_slow=is_timed and is_worth_saying(lost_whole_s, float(whole.time_s[-1] - whole.time_s[0])),
         windows=[_on_page(window, rows) for window in windows],
         worst=[_worst(quantity, whole, rows) for quantity in whole.quantities if quantity.name != "speed"],
         told=findings,
