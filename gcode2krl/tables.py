@@ -12,7 +12,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gcode2krl.arrays import Bools, Floats, Ints32
+from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.exchange.table import Table as Table
 from gcode2krl.exchange.table import column, derived_column
 from gcode2krl.units import DEG_PER_RAD
@@ -470,6 +470,68 @@ class PartHistory(NamedTuple):
         ``deviation_mm`` (m, 3) of the tip along ``$BASE``. NaN where nothing was cut.
         """
         off: Floats = np.einsum("ijk,ijk->ij", self.normal, deviation_mm[self.left_by])
+        return off
+
+
+class SurfaceHistory(NamedTuple):
+    """How a part comes about under a tool whose axis turns: a surface through cubes in ``$BASE``.
+
+    A cube has one point of the surface or none. The four cubes round an edge that leads out of the material
+    make a square.
+    """
+
+    low_mm: Floats
+    """(3,) low corner."""
+    cell_mm: Floats
+    """(3,) size of a cube."""
+    cubes: Ints
+    """(3,) how many there are along each axis."""
+    site: Ints32
+    """(s,) cubes, x first, that ever have a point, rising."""
+    cell: Ints32
+    """(e,) events in the order of time: a site became otherwise; first those of the raw part,"""
+    shown: NDArray[np.int64]
+    """(e,) as it is from this row of the Motion on, -1 in the raw part; no square is torn at any row,"""
+    sample: NDArray[np.int64]
+    """(e,) by this row of the Motion, -1 for none,"""
+    share: NDArray[np.uint8]
+    """(e, 3) to a point at these 255ths of the cube,"""
+    state: NDArray[np.uint8]
+    """(e,) with material at its low corner (1) and beyond it along x, y, z (2, 4, 8); 0 = without a point."""
+    left_by: NDArray[np.int64]
+    """(s,) the row of the Motion that left the finished surface, -1 where nothing was cut or none is."""
+    normal: Floats
+    """(s, 3) unit normal out of the finished surface, NaN there."""
+
+    def surface(self, sample: int | None = None) -> tuple[Floats, Ints]:
+        """Return points (s, 3) in mm, of each site, and squares (q, 4) of them, at a row of the Motion.
+
+        Default: of the finished part. Seen from outside the corners of a square turn left.
+        """
+        done = len(self.cell) if sample is None else int(np.searchsorted(self.shown, sample, side="right"))
+        last = np.full(len(self.site), -1)
+        last[self.cell[:done]] = np.arange(done)  # of several the last one counts
+        state = np.where(last >= 0, self.state[last], 0)
+        corner = np.stack(np.unravel_index(self.site, self.cubes[::-1])[::-1], axis=1)
+        points: Floats = self.low_mm + (corner + self.share[last] / 255.0) * self.cell_mm
+        strides = np.array([1, self.cubes[0], self.cubes[0] * self.cubes[1]])
+        squares = []
+        for axis in range(3):
+            low, high = state & 1, state >> (axis + 1) & 1
+            u, v = strides[(axis + 1) % 3], strides[(axis + 2) % 3]
+            for ends, way in (((low > high), (0, u, u + v, v)), ((low < high), (0, v, u + v, u))):
+                squares.append(np.searchsorted(self.site, self.site[ends, None] - np.array(way)))
+        return points, np.concatenate(squares)
+
+    def volume_mm3(self, sample: int | None = None) -> float:
+        """Return the volume that stands at a row of the Motion; default: of the finished part."""
+        points, squares = self.surface(sample)
+        a, b, c, d = (points[squares[:, k]] - self.low_mm for k in range(4))
+        return float((a * (np.cross(b, c) + np.cross(c, d))).sum()) / 6.0
+
+    def error_mm(self, deviation_mm: Floats) -> Floats:
+        """Return how far the finished surface (s,) is off along its normal; as `PartHistory.error_mm`."""
+        off: Floats = np.einsum("ij,ij->i", self.normal, deviation_mm[self.left_by])
         return off
 
 

@@ -85,6 +85,7 @@ ARGUMENTS = {
     "Result": ("gcode2krl.cutting.reading", "RESULT"),
     "Dexels": ("gcode2krl.cutting.dexels", "DEXELS"),
     "Turned": ("gcode2krl.cutting.turned", "TURNED"),
+    "Surface": ("gcode2krl.cutting.surface", "SURFACE"),
     "Bodies": ("gcode2krl.collision.scene", "BODIES"),
     "Obstacles": ("gcode2krl.collision.scene", "OBSTACLES"),
     "Watched": ("gcode2krl.collision.along", "WATCHED"),

@@ -144,9 +144,28 @@ def test_what_needs_one_height_is_refused(tmp_path):
     cell = load_cell(CELL)
     prediction = predict(PART, cell)
     with pytest.raises(RefusedError, match="the tool axis changes"):
-        history_of(prediction.toolpath, prediction.motion, cell)
-    with pytest.raises(RefusedError, match="the tool axis changes"):
         _ = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).part
+
+
+def test_the_part_is_shown_with_its_error():
+    cell = load_cell(CELL)
+    prediction = predict(PART, cell)
+    history = history_of(prediction.toolpath, prediction.motion, cell)
+    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).left
+    assert history.volume_mm3() == pytest.approx(left.volume_mm3, rel=0.005)
+    points, _ = history.surface()
+    off_mm = history.error_mm(prediction.deflection.deflection_base_mm)
+    line = prediction.toolpath.source_line[prediction.motion.move[history.left_by]]
+    # the cone of 15 degrees widens downwards
+    of_cone = (line > 24) & (line < 45) & (np.hypot(points[:, 0], points[:, 1]) < 35.0)
+    of_cone &= np.abs(history.normal[:, 2] - np.sin(np.radians(15.0))) < 0.05
+    assert of_cone.sum() > 500
+    outward = (history.normal[of_cone, :2] * points[of_cone, :2]).sum(axis=1)
+    assert (outward > 0.0).all()
+    deflection_mm = prediction.deflection.deflection_base_mm[history.left_by[of_cone]]
+    assert np.abs(off_mm[of_cone]).max() <= np.linalg.norm(deflection_mm, axis=1).max()
+    assert off_mm[of_cone].mean() < -0.5  # the mill is drawn into the cone
+    assert len(prediction.plot.part().axes) == 4  # three sides and the scale
 
 
 def test_a_tilted_tool_leaves_along_its_axis():

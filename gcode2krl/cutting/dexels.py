@@ -24,8 +24,9 @@ MOST = 32
 CELLS_PER_DIAMETER = 32.0
 """Default resolution: 0.5 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
 MAX_RAYS = 8_000_000
+SHORTENED = 127
+"""Length of a packed normal."""
 _FEW = 2
-_SHORTENED = 127
 
 
 class Dexels(NamedTuple):
@@ -37,7 +38,7 @@ class Dexels(NamedTuple):
     ends: NDArray[np.float32]
     """(rays, 2k) where material begins and ends, in pairs."""
     facing: Ints32
-    """(rays, 2k) normal of the surface out of the material at each end, three signed bytes."""
+    """(rays, 2k) normal of the surface out of the material at each end, three signed bytes; above a stamp."""
     filled: Ints32
     """(rays,) stretches that a ray has."""
     bound: NDArray[np.float32]
@@ -197,6 +198,6 @@ def _firsts(cells: Ints) -> Ints:
 
 def _packed(normals: Floats) -> Ints32:
     """Return unit vectors (n, 3) as three signed bytes each."""
-    parts = np.rint(normals * _SHORTENED).astype(np.int64) & 0xFF
+    parts = np.rint(normals * SHORTENED).astype(np.int64) & 0xFF
     packed: Ints32 = (parts @ np.array([1, 1 << 8, 1 << 16])).astype(np.int32)
     return packed

@@ -25,8 +25,9 @@ from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.milling import raw_field, shaped
 from gcode2krl.cutting.outlook import outlook_of, turned
 from gcode2krl.cutting.records import taken
+from gcode2krl.cutting.surface import surface_history
 from gcode2krl.cutting.sweep import BALL, GRID, LANES, PATH, Grid, Path
-from gcode2krl.tables import Motion, PartHistory, Toolpath, lengths
+from gcode2krl.tables import Motion, PartHistory, SurfaceHistory, Toolpath, lengths
 
 Heights = NDArray[np.float32]
 
@@ -54,18 +55,18 @@ def history_of(
     cell: Cell,
     most_blocks: int = MOST_BLOCKS,
     most_events: int = MOST_EVENTS,
-) -> PartHistory:
-    """Return how the part comes about along a motion.
+) -> PartHistory | SurfaceHistory:
+    """Return how the part comes about along a motion; a surface where the tool axis turns.
 
     Raises
     ------
     NotUnderstoodError
         Where the stock cannot be read.
-    RefusedError
-        Where the tool axis changes within the program.
     """
     outlook = outlook_of([motion])
-    outlook.require_one_axis("how the part comes about is not shown")
+    if outlook.turns:
+        slots, most = (_SHORTEST_S, 1.0 / _SLOTS), (most_blocks, most_events)
+        return surface_history(toolpath, motion, cell, outlook, slots, most)
     fine, to_field = raw_field(toolpath, motion, cell)
     field, side = _coarse(fine, most_blocks)
     grid, raw_mm = field.grid(0, 0, field.height_mm.shape[1]), _means(field, side)

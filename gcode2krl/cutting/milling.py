@@ -133,8 +133,7 @@ _AXIS_TURNS = Issue(
     "note",
     "axis-turns",
     0,
-    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, peaks are upper bounds, and the "
-    "finished part is not shown",
+    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, and peaks are upper bounds",
 )
 _APPROACH_MM = 1e-3
 _ARC_COLUMNS = 6
@@ -456,7 +455,7 @@ class Milling:
         owner = way.sample[new]
         points = TurnedPoints(
             position_mm=way.position_mm[new],
-            axis=_axes_between(axis, way)[new],
+            axis=axes_between(axis, way)[new],
             feed_mm=(rows.f_z_mm[:, None] * rows.direction)[owner],
             swing=(tooth_s[:, None] * rate)[owner],
             tool=rows.tool[owner],
@@ -554,7 +553,7 @@ def tool_axes(motion: Motion) -> Floats:
     return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
-def _axes_between(axis: Floats, way: Shaped) -> Floats:
+def axes_between(axis: Floats, way: Shaped) -> Floats:
     """Return the axis (k, 3) on a way: between two samples in even parts from one to the other."""
     row = np.arange(len(way.read))
     at = np.interp(row, row[way.read], way.sample[way.read].astype(np.float64))

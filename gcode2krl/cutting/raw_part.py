@@ -70,18 +70,28 @@ def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: lis
     return block(box, _resolution(box, tools, own_mm), guessed=True)
 
 
-def dexels_of(toolpath: Toolpath, cell: Cell, tools: list[Tool]) -> tuple[Dexels, bool]:
-    """Return the raw part as dexels, and whether it is guessed; arguments and errors as above."""
+def dexels_of(
+    toolpath: Toolpath, cell: Cell, tools: list[Tool], most_squares: int | None = None
+) -> tuple[Dexels, bool]:
+    """Return the raw part as dexels, and whether it is guessed; arguments and errors as above.
+
+    Cells are so large that at most so many squares of theirs cover the box around it.
+    """
     stock, smallest_mm = cell.stock, min(tool.diameter_mm for tool in tools)
-    cell_mm = stock.resolution_mm if stock is not None and stock.resolution_mm is not None else None
-    if cell_mm is None:
-        cell_mm = smallest_mm / DEXELS_PER_DIAMETER
-    if stock is not None and stock.mesh is not None:
-        return dexel_mesh(load_mesh(Path(stock.mesh)), cell_mm), False
-    if stock is not None and stock.box_mm is not None:
-        return dexel_block(np.array(stock.box_mm), cell_mm), False
-    radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
-    return dexel_block(guessed_box(toolpath, np.eye(3), radius_mm, edges_mm), cell_mm), True
+    own_mm = stock.resolution_mm if stock is not None else None
+    mesh = load_mesh(Path(stock.mesh)) if stock is not None and stock.mesh is not None else None
+    stated_mm = stock.box_mm if stock is not None and mesh is None else None
+    if mesh is not None or stated_mm is not None:
+        box_mm = np.array(stated_mm if mesh is None else mesh.bounds)
+    else:
+        radius_mm, edges_mm = max(tool.diameter_mm for tool in tools) / 2.0, max(map(_edges_mm, tools))
+        box_mm = guessed_box(toolpath, np.eye(3), radius_mm, edges_mm)
+    cell_mm = own_mm if own_mm is not None else smallest_mm / DEXELS_PER_DIAMETER
+    if most_squares is not None:
+        x, y, z = box_mm[1] - box_mm[0]
+        cell_mm = max(cell_mm, math.sqrt(2.0 * (x * y + y * z + z * x) / most_squares))
+    is_guessed = mesh is None and stated_mm is None
+    return (dexel_block(box_mm, cell_mm) if mesh is None else dexel_mesh(mesh, cell_mm)), is_guessed
 
 
 def _edges_mm(tool: Tool) -> float:

@@ -118,10 +118,10 @@ class TurnedEngagement:
         """Take the material, which is cut, and what to cut it with."""
         cell_mm = float(dexels.cell_mm.max())
         self.dexels, self._law = dexels, law
-        self._bodies = np.array([_body(tool) for tool in tools])
+        self._bodies = np.array([body_of(tool) for tool in tools])
         radius = self._bodies[:, 4]
         self._apart_mm = 2.0 * radius / nodes_per_diameter
-        self._longest_mm = _STEP_OF_DIAMETER * 2.0 * radius
+        self._longest_mm = longest_step(self._bodies)
         self._cutters = _cutters(tools, cell_mm, self._apart_mm)
         self._progress, self._contact = np.array([0, -1], dtype=np.int64), np.zeros(CONTACT_NUMBERS)
         none, empty, vectors = np.zeros(0, dtype=np.bool_), np.zeros(0), np.zeros((0, 3))
@@ -192,11 +192,18 @@ class TurnedEngagement:
         self._progress -= row
 
 
-def _body(tool: Tool) -> tuple[float, ...]:
+def body_of(tool: Tool) -> tuple[float, ...]:
+    """Return a row of `Turned.bodies`."""
     shape = shape_of(tool)
     sine, cosine = math.sin(shape.kappa_rad), math.cos(shape.kappa_rad)
     cosine = 0.0 if abs(cosine) < 1e-9 else cosine
     return shape.bottom_mm, shape.corner_mm, sine, cosine, shape.radius_mm, shape.flute_mm
+
+
+def longest_step(bodies: Floats) -> Floats:
+    """Return the longest step (t,) of the removal in mm."""
+    longest_mm: Floats = _STEP_OF_DIAMETER * 2.0 * bodies[:, 4]
+    return longest_mm
 
 
 def _cutters(tools: Sequence[Tool], cell_mm: float, apart_mm: Floats) -> Cutters:

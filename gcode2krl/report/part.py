@@ -15,12 +15,11 @@ from gcode2krl.prediction import Prediction
 from gcode2krl.report.drawing import look
 from gcode2krl.report.drawing import title as titled
 from gcode2krl.report.part_error import error_on, scale_end
-from gcode2krl.tables import PartHistory
+from gcode2krl.tables import PartHistory, SurfaceHistory
 
 OFF_COLOURS = "RdBu_r"
 _UNCUT, _UNKNOWN = (0.80, 0.75, 0.63), (0.59, 0.62, 0.65)
 _LIGHT = np.array([-1.0, -2.0, 3.0]) / np.sqrt(14.0)
-_TILT_DEG = 35.0
 _LEAST_WEIGHT = 0.02
 
 
@@ -29,13 +28,28 @@ class _Side(NamedTuple):
 
     name: str
     turn_deg: float
-    """About the tool axis; 0 looks along +y."""
+    """About the tool axis; 0 looks along +y,"""
+    tilt_deg: float
+    """and down."""
 
 
-_SIDES = (_Side("From the front left", -35.0), _Side("From the rear right", 145.0))
+_SIDES = (
+    _Side("From above", 0.0, 90.0),
+    _Side("From the front left", -35.0, 35.0),
+    _Side("From the rear right", 145.0, 35.0),
+)
 
 
-def part_figure(prediction: Prediction, history: PartHistory) -> Figure:
+class _Faces(NamedTuple):
+    """Squares of a surface."""
+
+    corners_mm: Floats
+    """(f, 4, 3) turning left as seen from outside."""
+    colours: Floats
+    """(f, 3)"""
+
+
+def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -> Figure:
     """Draw the finished part from above, from the front left and from the rear right.
 
     What was cut is coloured by the error, where it is known: above 0 material is left.
@@ -45,22 +59,29 @@ def part_figure(prediction: Prediction, history: PartHistory) -> Figure:
     off_mm = np.full(history.left_by.shape, np.nan) if error_mm is None else error_mm
     end_mm = scale_end(off_mm) if known else 1.0
     shade = ScalarMappable(Normalize(-end_mm, end_mm), colormaps[OFF_COLOURS])
-    colours = shade.to_rgba(np.nan_to_num(off_mm))[:, :, :3]
+    colours = shade.to_rgba(np.nan_to_num(off_mm))[..., :3]
     colours[np.isnan(off_mm)] = _UNKNOWN
     colours[history.left_by < 0] = _UNCUT
-    steep = 1.0 - np.abs(np.nan_to_num(history.normal[:, :, 2]))
-    weight = np.where(history.left_by < 0, _LEAST_WEIGHT, steep + 0.2)  # walls are narrow, and shall be seen
+    weight = np.where(history.left_by < 0, _LEAST_WEIGHT, 1.0)
+    if isinstance(history, PartHistory):
+        steep = 1.0 - np.abs(np.nan_to_num(history.normal[:, :, 2]))
+        weight *= steep + 0.2  # walls are narrow, and shall be seen
+        faces, upright = _of_heights(history, colours, weight), bool(np.allclose(history.to_field, np.eye(3)))
+    else:
+        faces, upright = _of_surface(history, colours, weight), True
     with look():
         figure = Figure(figsize=(11.0, 8.5), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
-        above = figure.add_subplot(grid[0, :])
-        _draw_above(above, history, colours)
-        oblique = [figure.add_subplot(grid[1, k]) for k in range(2)]
-        for axes, side in zip(oblique, _SIDES, strict=True):
-            _draw_side(axes, history, colours, weight, side)
+        places = [figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1])]
+        for axes, side in zip(places, _SIDES, strict=True):
+            _draw(axes, faces, side)
+        if not upright:
+            places[0].set_title("Along the tool axis", loc="left")
+        for name, set_label in (("X", places[0].set_xlabel), ("Y", places[0].set_ylabel)):
+            set_label(f"{name} (mm)" if upright else "Across the tool axis (mm)")
         if known:
             label = "Error normal to the surface (mm): above 0 material is left, below 0 too much is cut"
-            figure.colorbar(shade, ax=[above, *oblique], label=label, aspect=45, extend="both")
+            figure.colorbar(shade, ax=places, label=label, aspect=45, extend="both")
         words = (
             "Error of the finished part by deflection" if known else "Finished part; its error is not known"
         )
@@ -68,54 +89,57 @@ def part_figure(prediction: Prediction, history: PartHistory) -> Figure:
     return figure
 
 
-def _draw_above(axes: Axes, history: PartHistory, colours: Floats) -> None:
-    """Draw what the tool sees; axes are those of ``$BASE`` where the tool stands upright in it."""
-    low, size = history.origin_mm, history.cell_mm * colours.shape[1::-1]
-    extent = (low[0], low[0] + size[0], low[1], low[1] + size[1])
-    axes.imshow(colours, origin="lower", extent=extent, interpolation="nearest")
-    upright = bool(np.allclose(history.to_field, np.eye(3)))
-    axes.set_title("From above" if upright else "Along the tool axis", loc="left")
-    axes.set_xlabel("X (mm)" if upright else "Across the tool axis (mm)")
-    axes.set_ylabel("Y (mm)" if upright else "Across the tool axis (mm)")
-
-
-def _draw_side(axes: Axes, history: PartHistory, colours: Floats, weight: Floats, side: _Side) -> None:
-    """Draw the part obliquely: squares between cells, those in the back first."""
+def _of_heights(history: PartHistory, colours: Floats, weight: Floats) -> _Faces:
+    """Return the squares between cells, with colours (r, c, 3) that are mixed by weights (r, c)."""
     x, y = (
         origin + (np.arange(count) + 0.5) * size
         for origin, count, size in zip(history.origin_mm, colours.shape[1::-1], history.cell_mm, strict=True)
     )
     heights = np.pad(history.heights_mm(), 1, constant_values=history.bottom_mm)
     plane = np.meshgrid(np.pad(x, 1, mode="edge"), np.pad(y, 1, mode="edge"))
-    corners = _corners(np.stack([*plane, heights], axis=2))
     shades = np.concatenate([colours * weight[:, :, None], weight[:, :, None]], axis=2)
-    mixed = _corners(np.pad(shades, ((1, 1), (1, 1), (0, 0)), mode="edge")).sum(axis=2)
-    across = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1])
-    normal = across / np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
-    face = np.clip(mixed[:, :, :3] / mixed[:, :, 3:] * _lit(normal)[:, :, None], 0.0, 1.0).reshape(-1, 3)
-    corners = corners.reshape(-1, 4, 3)
-    turn, tilt = np.radians(side.turn_deg), np.radians(_TILT_DEG)
+    mixed = _corners(np.pad(shades, ((1, 1), (1, 1), (0, 0)), mode="edge")).sum(axis=1)
+    return _Faces(_corners(np.stack([*plane, heights], axis=2)), mixed[:, :3] / mixed[:, 3:])
+
+
+def _of_surface(history: SurfaceHistory, colours: Floats, weight: Floats) -> _Faces:
+    """Return the squares of a surface, with colours (s, 3) that are mixed by weights (s,)."""
+    points, squares = history.surface()
+    shades = np.concatenate([colours * weight[:, None], weight[:, None]], axis=1)
+    mixed = shades[squares].sum(axis=1)
+    return _Faces(points[squares], mixed[:, :3] / mixed[:, 3:])
+
+
+def _draw(axes: Axes, faces: _Faces, side: _Side) -> None:
+    """Draw squares that face a side, those in the back first; axes only where it looks straight down."""
+    corners = faces.corners_mm
+    across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    turn, tilt = np.radians(side.turn_deg), np.radians(side.tilt_deg)
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     ahead = np.array([-np.sin(turn), np.cos(turn), 0.0])
     up = np.sin(tilt) * ahead + np.cos(tilt) * np.array([0.0, 0.0, 1.0])
     to_eye = np.sin(tilt) * np.array([0.0, 0.0, 1.0]) - np.cos(tilt) * ahead
-    order = np.argsort(-(corners.mean(axis=1) @ ahead), kind="stable")
-    order = order[(normal.reshape(-1, 3) @ to_eye)[order] > 0.0]
+    order = np.argsort(corners.mean(axis=1) @ to_eye, kind="stable")
+    order = order[(normal @ to_eye)[order] > 1e-6]
+    colours = np.clip(faces.colours * _lit(normal)[:, None], 0.0, 1.0)[order]
     drawn = np.stack([corners @ right, corners @ up], axis=2)[order]
-    squares = PolyCollection(list(drawn), facecolors=face[order], edgecolors=face[order], linewidths=0.2)
+    squares = PolyCollection(list(drawn), facecolors=colours, edgecolors=colours, linewidths=0.2)
     squares.set_rasterized(True)
     axes.add_collection(squares)
     axes.autoscale_view()
     axes.set_aspect("equal")
-    axes.set_axis_off()
+    if side.tilt_deg < 90.0:
+        axes.set_axis_off()
     axes.set_title(side.name, loc="left")
 
 
 def _corners(values: Floats) -> Floats:
-    """Return what stands at the four corners (r - 1, c - 1, 4, k) of the squares between points (r, c, k)."""
-    return np.stack([values[:-1, :-1], values[:-1, 1:], values[1:, 1:], values[1:, :-1]], axis=2)
+    """Return what stands at the four corners (f, 4, k) of the squares between points (r, c, k)."""
+    each = [values[:-1, :-1], values[:-1, 1:], values[1:, 1:], values[1:, :-1]]
+    return np.stack(each, axis=2).reshape(-1, 4, values.shape[2])
 
 
 def _lit(normal: Floats) -> Floats:
-    """Return how bright (r, c) what faces so is."""
+    """Return how bright (f,) what faces so is."""
     return np.asarray(0.62 + 0.38 * np.clip(np.abs(normal @ _LIGHT), 0.0, 1.0))

@@ -4,7 +4,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.prediction import Prediction
-from gcode2krl.tables import PartHistory
+from gcode2krl.tables import PartHistory, SurfaceHistory
 
 _MOST_OF_CELLS = 99.5
 _STEPS_MM = (0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
@@ -16,7 +16,7 @@ def scale_end(off_mm: Floats) -> float:
     return next((step for step in _STEPS_MM if step >= most), _STEPS_MM[-1])
 
 
-def error_on(history: PartHistory, prediction: Prediction) -> Floats | None:
+def error_on(history: PartHistory | SurfaceHistory, prediction: Prediction) -> Floats | None:
     """Return the error (r, c) that the deflection leaves, above 0 where material is left; None if unknown.
 
     It is unknown for a compensated program, whose path is moved against the deflection.

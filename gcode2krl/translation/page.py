@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from gcode2krl.arrays import Floats
     from gcode2krl.cell import Cell
     from gcode2krl.prediction import Prediction
-    from gcode2krl.tables import PartHistory, Toolpath
+    from gcode2krl.tables import PartHistory, SurfaceHistory, Toolpath
 
 _LARGEST_TEXT = 400_000_000
 _GZIP = b"\x1f\x8b"
@@ -116,7 +116,7 @@ def _predicted(
         return None
 
 
-def part_of(prediction: "Prediction") -> "PartHistory | None":
+def part_of(prediction: "Prediction") -> "PartHistory | SurfaceHistory | None":
     """Return how the part comes about, None where nothing is cut or where that is not known."""
     import numpy as np
 

@@ -18,7 +18,7 @@ a plane parts them from the body at both poses. */
 #define PARALLEL 1e-6      /* cosine between ray and surface below which its slope says nothing of the step */
 #define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
 
-enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10, SHORTENED = 127 };
+enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10 };
 
 typedef struct {
     const Dexels *stock;
@@ -365,17 +365,15 @@ static Hit swept(const Cut *cut, int64_t ray, const double *place) {
     return best;
 }
 
-static int32_t packed(const double *normal) {
-    uint32_t bits = 0;
+static int32_t packed(const double *normal, int32_t stamp) {
+    uint32_t bits = (uint32_t)stamp << 24;
     for (int k = 0; k < 3; k++)
-        bits |= (uint32_t)((int32_t)lrint(-normal[k] * SHORTENED) & 0xff) << (8 * k);
+        bits |= (uint32_t)((int32_t)lrint(-normal[k] * TD_SHORTENED) & 0xff) << (8 * k);
     return (int32_t)bits;
 }
 
-static inline double unpacked(int32_t bits, int k) { return (double)(int8_t)((uint32_t)bits >> (8 * k)) / SHORTENED; }
-
-/* Take what is covered out of a ray; return false where it has no room. */
-static bool take(const Dexels *stock, int64_t ray, const Hit *hit, double *longest) {
+/* Take what is covered out of a ray, and put a stamp on the ends that it gets; return false where it has no room. */
+static bool take(const Dexels *stock, int64_t ray, const Hit *hit, int32_t stamp, double *longest) {
     const int64_t most_ends = stock->ends.columns;
     const float low = (float)hit->at[0], high = (float)hit->at[1];
     const int64_t count = AT(stock->filled, ray);
@@ -399,12 +397,12 @@ static bool take(const Dexels *stock, int64_t ray, const Hit *hit, double *longe
             ends[2 * left] = a;
             ends[2 * left + 1] = low;
             facing[2 * left] = at_a;
-            facing[2 * left++ + 1] = packed(hit->normal[0]);
+            facing[2 * left++ + 1] = packed(hit->normal[0], stamp);
         }
         if (is_behind) {
             ends[2 * left] = high;
             ends[2 * left + 1] = b;
-            facing[2 * left] = packed(hit->normal[1]);
+            facing[2 * left] = packed(hit->normal[1], stamp);
             facing[2 * left++ + 1] = at_b;
         }
     }
@@ -449,10 +447,6 @@ static void cells_in(const Dexels *stock, int axis, double low, double high, int
     const double origin = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis);
     *first = most((int64_t)ceil((low - origin) / size - 0.5), 0);
     *after = least((int64_t)floor((high - origin) / size - 0.5) + 1, AT(stock->cells, axis));
-}
-
-static double middle_of(const Dexels *stock, int axis, int64_t cell) {
-    return AT(stock->low_mm, axis) + ((double)cell + 0.5) * AT(stock->cell_mm, axis);
 }
 
 /* Compute the bound of a block again: lowest and highest end. */
@@ -519,7 +513,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
             const int64_t ray = field->first + i * field->columns + j;
             const Hit hit = swept(cut, ray, place);
             if (hit.hits)
-                has_room = take(stock, ray, &hit, longest);
+                has_room = take(stock, ray, &hit, cut->step->stamp, longest);
         }
     bound_block(stock, field, row, column);
     return has_room;

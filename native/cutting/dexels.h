@@ -22,11 +22,12 @@ typedef struct {
 } Pose;
 
 /* A motion of a body from a pose: the tip goes straight, the axis turns evenly. It `follows` where what the body covers in
-   that pose has been cut. */
+   that pose has been cut. Its stamp, 0 to 255, is put on the ends that it leaves. */
 typedef struct {
     Pose from;
     double way[3], turn[3];
     bool follows;
+    int32_t stamp;
 } Step;
 
 /* Rays along an axis, columns along `u`, rows along `v`; the first of them and of their blocks. */
@@ -36,6 +37,20 @@ typedef struct {
 } Field;
 
 Field field_of(const Dexels *stock, int axis);
+
+/* Return a coordinate of the middle of a cell. */
+static inline double middle_of(const Dexels *stock, int axis, int64_t cell) {
+    return AT(stock->low_mm, axis) + ((double)cell + 0.5) * AT(stock->cell_mm, axis);
+}
+
+/* Return a coordinate of the normal at an end of a ray, and its stamp. */
+static inline double unpacked(int32_t facing, int k) {
+    return (double)(int8_t)((uint32_t)facing >> (8 * k)) / TD_SHORTENED;
+}
+static inline int32_t stamp_of(int32_t facing) { return (int32_t)((uint32_t)facing >> 24); }
+static inline int32_t with_stamp(int32_t facing, int32_t stamp) {
+    return (int32_t)(((uint32_t)facing & 0xffffff) | (uint32_t)stamp << 24);
+}
 
 /* Return the pose at a share of a step. */
 Pose pose_at(const Step *step, double share);

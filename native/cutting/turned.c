@@ -4,8 +4,8 @@ The engagement is read at nodes (cutting_mark_turned), before the stock there is
 that what is in front of the edge is thick. Points of the edge that the cutter has already been at since are found from its
 poses. Each band of the edge has the chip of its own place on a rigid body that turns, and the force law of slices.h. Between two nodes that agree lies what is between theirs, else every sample is read. */
 
-#include "cutting/dexels.h"
 #include "cutting/edge.h"
+#include "cutting/turned.h"
 
 #define NO_CHIP_SHARE 1e-6  /* chip over feed per tooth below which there is none */
 #define TAN_HOLLOW 0.035    /* of 2 degrees: a mill is hollow below by 1 to 3, and its bottom free of what it descends to gently */
@@ -57,19 +57,6 @@ typedef struct {
     int64_t met[MOST_MET], met_count;
 } Place;
 
-static const double *row3(Floats table, int64_t i) { return &CELL(table, i, 0); }
-
-static const Body *body_of(const Turned *points, int64_t tool) { return (const Body *)&CELL(points->bodies, tool, 0); }
-
-static Pose pose_of(const Turned *points, int64_t i) {
-    Pose pose;
-    copy3(row3(points->position_mm, i), pose.tip);
-    copy3(row3(points->axis, i), pose.axis);
-    return pose;
-}
-
-static double length3(const double *a) { return sqrt(dot3(a, a)); }
-
 /* Return the largest feed per tooth along the edge. */
 static double feed_of(const Turned *points, int64_t i) {
     const double top = body_of(points, AT(points->tool, i))->top;
@@ -104,9 +91,7 @@ EXPORT void cutting_mark_turned(const Turned *points, Floats apart_mm, Bools nod
     }
 }
 
-/* Cut the way from one point to another; return false where a ray has no room. */
-static bool cut_way(const Turning *turning, int64_t from, int64_t to, double *rapid_mm) {
-    const Turned *points = turning->points;
+bool cut_way(const Dexels *stock, const Turned *points, int64_t from, int64_t to, int32_t stamp, double *removed_mm) {
     const Body *body = body_of(points, AT(points->tool, to));
     const double longest = AT(points->longest_mm, AT(points->tool, to));
     Step step = {.from = pose_of(points, from)};
@@ -114,17 +99,16 @@ static bool cut_way(const Turning *turning, int64_t from, int64_t to, double *ra
     minus3(row3(points->axis, to), step.from.axis, step.turn);
     const double moved = length3(step.way) + body->top * length3(step.turn), turned = length3(step.turn);
     const int64_t count = most((int64_t)ceil(greater(moved / longest, turned / LONG_TURN)), 1);
-    double removed[3] = {0.0, 0.0, 0.0};
     for (int64_t part = 0; part < count; part++) {
-        Step piece = {.from = pose_at(&step, (double)part / (double)count), .follows = part > 0 || !AT(points->first, from)};
+        Step piece = {.from = pose_at(&step, (double)part / (double)count),
+                      .follows = part > 0 || !AT(points->first, from),
+                      .stamp = stamp};
         const Pose end = pose_at(&step, (double)(part + 1) / (double)count);
         minus3(end.tip, piece.from.tip, piece.way);
         minus3(end.axis, piece.from.axis, piece.turn);
-        if (!cut_out(turning->stock, body, &piece, removed))
+        if (!cut_out(stock, body, &piece, removed_mm))
             return false;
     }
-    if (AT(points->rapid, to))
-        *rapid_mm = greater(*rapid_mm, lesser(removed[0], lesser(removed[1], removed[2])));
     return true;
 }
 
@@ -179,8 +163,11 @@ static bool follow(const Turning *turning, double way_mm, int64_t last, Progress
         }
         if (to < 0 || may_grow)
             return true;
-        if (!AT(points->first, to) && !cut_way(turning, progress->cut, to, &AT(rapid_mm, to)))
+        double removed[3] = {0.0, 0.0, 0.0};
+        if (!AT(points->first, to) && !cut_way(turning->stock, points, progress->cut, to, 0, removed))
             return false;
+        if (AT(points->rapid, to))
+            AT(rapid_mm, to) = greater(AT(rapid_mm, to), lesser(removed[0], lesser(removed[1], removed[2])));
         progress->cut = to;
     }
 }

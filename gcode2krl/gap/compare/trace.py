@@ -403,7 +403,8 @@ def _stepped(trace: Trace, window: Ints) -> Ints:
         return window[:0]
     times = np.max(change / np.maximum(np.median(change, axis=0), 1e-300), axis=1)
     most = np.argsort(times)[-_LIMITS.stepped_windows :]
-    return window[first[1 + most[times[most] > _LIMITS.stepped_times]]]
+    stepped: Ints = window[first[1 + most[times[most] > _LIMITS.stepped_times]]]
+    return stepped
 
 
 def split(traces: Sequence[Trace], explaining: int) -> tuple[list[Trace], list[Trace]]:

@@ -19,6 +19,7 @@ from gcode2krl.report.page.losses import (
     NotableSample,
     Window,
     is_worth_saying,
+    lost_parts,
     lost_time,
     time_shares,
     worst_places,
@@ -31,13 +32,15 @@ from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, sam
 from gcode2krl.report.page.sketch import robot_sketch
 from gcode2krl.report.part_error import error_on
 from gcode2krl.report.tool_axes import drawn_tools
-from gcode2krl.tables import PartHistory, Toolpath
+from gcode2krl.tables import PartHistory, SurfaceHistory, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
 
 # A mesh with few triangles, to be looked at: what lies in one cell of a grid becomes one corner.
 #
 # Not for distances: a corner moves by up to the diagonal of a cell.
 
+MOST_DATA = 2_900_000
+"""Letters of the samples of a page, which has some 6 MB then; of more fewer are drawn."""
 MOST_TRIANGLES = 4000
 """Triangles that a page draws of one mesh, some 30 kB."""
 _FINEST = 256
@@ -121,6 +124,9 @@ class Content:
     facts: list[tuple[str, str]] = field(default_factory=list)
     shares: list[tuple[str, float]] = field(default_factory=list)
     lost_s: float = 0.0
+    lost_parts: list[tuple[str, float]] = field(default_factory=list)
+    is_slow: bool = False
+    """True where so much time is lost that it is worth a word."""
     windows: list[Window] = field(default_factory=list)
     worst: list[Worst] = field(default_factory=list)
     told: Told = field(default_factory=lambda: told(()))
@@ -145,7 +151,7 @@ def content_of(
     stock_mm: Floats | None = None,
     meshes_mm: Mapping[str, Floats] | None = None,
     nominal: dict[str, Any] | None = None,
-    part: PartHistory | None = None,
+    part: PartHistory | SurfaceHistory | None = None,
 ) -> Content:
     """Return the page of a prediction.
 
@@ -171,19 +177,15 @@ def content_of(
             toolpath=prediction.toolpath,
             text=text,
         )
-    made = _content(
-        _name(prediction.toolpath),
-        verdict,
-        whole,
-        listed,
-        prediction.cell,
-        text,
-        stock_mm,
-        _facts(prediction),
-    )
+    rows = thinned(whole)
+    drawn = (listed, prediction.cell, text, stock_mm, _facts(prediction))
+    made = _content(_name(prediction.toolpath), verdict, whole, rows, *drawn)
+    if len(made.data) > MOST_DATA:
+        rows = thinned(whole, len(rows) // 2)
+        made = _content(_name(prediction.toolpath), verdict, whole, rows, *drawn)
     made = _with_meshes(_with_tool_axes(made, prediction.toolpath), meshes_mm or {})
-    made = made if nominal is None else _with_nominal(made, nominal, whole)
-    return made if part is None else _with_part(made, part, prediction, whole, nominal)
+    made = made if nominal is None else _with_nominal(made, nominal, whole, rows)
+    return made if part is None else _with_part(made, part, prediction, rows, nominal)
 
 
 def content_of_refused(
@@ -201,7 +203,7 @@ def content_of_refused(
     rapid_mm_s = cell.controller.rapid_m_s * MM_PER_M if cell is not None else None
     whole = samples_of_path(toolpath, rapid_mm_s) if toolpath is not None else None
     if toolpath is not None and whole is not None and len(whole) > 1:
-        made = _content(title, verdict, whole, listed, cell, text, stock_mm, [])
+        made = _content(title, verdict, whole, thinned(whole), listed, cell, text, stock_mm, [])
         return _with_tool_axes(made, toolpath)
     shown = told(listed)
     return Content(
@@ -219,14 +221,14 @@ def _content(
     title: str,
     verdict: str,
     whole: PageSamples,
+    rows: Ints,
     issues: tuple[Issue, ...],
     cell: Cell | None,
     text: str | None,
     stock_mm: Floats | None,
     facts: list[tuple[str, str]],
 ) -> Content:
-    """Return the page of samples; the figures come from all of them, also where fewer are drawn."""
-    rows = thinned(whole)
+    """Return the page of samples; the figures come from all of them, also where only ``rows`` are drawn."""
     shown = whole.at(rows)
     number, passes = passes_of(shown.position_mm[:, 2], shown.rapid, shown.tool, shown.line)
     tools = sorted({int(tool) for tool in np.unique(shown.tool)})
@@ -257,6 +259,8 @@ def _content(
         facts=facts,
         shares=time_shares(whole.time_s, whole.speed_mm_s, whole.rapid, whole.cutting) if is_timed else [],
         lost_s=lost_whole_s,
+        lost_parts=lost_parts(lost_s, whole.speed_mm_s) if is_timed else [],
+        is_slow=is_timed and is_worth_saying(lost_whole_s, float(whole.time_s[-1] - whole.time_s[0])),
         windows=[_on_page(window, rows) for window in windows],
         worst=[_worst(quantity, whole, rows) for quantity in whole.quantities if quantity.name != "speed"],
         told=findings,
@@ -290,9 +294,8 @@ def _with_meshes(content: Content, meshes_mm: Mapping[str, Floats]) -> Content:
     )
 
 
-def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples) -> Content:
+def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples, rows: Ints) -> Content:
     """Return a page with the differences to the nominal part, as a table and as solids."""
-    rows = thinned(whole)
     deviations = [
         Deviation(
             **{key: deviation[key] for key in ("kind", "volume_mm3", "depth_mm", "place_mm")},
@@ -318,14 +321,16 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples)
 
 def _with_part(
     content: Content,
-    part: PartHistory,
+    part: PartHistory | SurfaceHistory,
     prediction: Prediction,
-    whole: PageSamples,
+    rows: Ints,
     nominal: dict[str, Any] | None,
 ) -> Content:
     """Return a page with the part as it is cut."""
-    above_mm = None if nominal is None else worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
-    head, events, cells = drawn_part(part, thinned(whole), error_on(part, prediction), above_mm)
+    above_mm = None
+    if nominal is not None and isinstance(part, PartHistory):
+        above_mm = worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
+    head, events, cells = drawn_part(part, rows, error_on(part, prediction), above_mm)
     return replace(content, head=content.head | {"part": head}, part=events, part_cells=cells)
 
 

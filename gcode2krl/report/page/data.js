@@ -51,8 +51,8 @@ async function readMeshes() {
 // How the part comes about, and what is known of its cells.
 async function readPart() {
   if (!head.part) return null;
-  const { events, columns, cells: [width, depth] } = head.part;
-  return Promise.all([readColumns("part", events.columns, events.rows), readColumns("part-cells", columns, width * depth)]);
+  const { events, columns, places } = head.part;
+  return Promise.all([readColumns("part", events.columns, events.rows), readColumns("part-cells", columns, places)]);
 }
 
 async function readLines() {

@@ -16,6 +16,8 @@ _WORTH_NAMING = 0.04
 _APART = 0.02
 """Share of the whole time by which two worst places lie apart."""
 _STILL_MM_S = 1e-3
+_NEARLY_STILL = 0.05
+"""Share of its highest speed from which a ramp begins or to which it goes at a stop: samples may miss it."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,20 @@ def lost_time(time_s: Floats, speed_mm_s: Floats, feed_mm_s: Floats) -> Floats:
     at_feed = np.isfinite(feed_mm_s) & (feed_mm_s > 0.0)
     ratio = np.divide(speed_mm_s, feed_mm_s, out=np.ones(len(time_s)), where=at_feed)
     return durations(time_s) * np.clip(1.0 - ratio, 0.0, 1.0)
+
+
+def lost_parts(lost_s: Floats, speed_mm_s: Floats) -> list[tuple[str, float]]:
+    """Return what of the lost time (m,) is lost on the way into and out of stops, and what elsewhere."""
+    slope = np.sign(np.round(np.diff(speed_mm_s), 6))
+    if not len(slope):
+        return []
+    begin = np.flatnonzero(np.append(True, slope[1:] != slope[:-1]))
+    end = np.append(begin[1:], len(slope))  # also the last sample of a run of one slope
+    first, last = speed_mm_s[begin], speed_mm_s[end]
+    is_ramp = np.repeat(np.minimum(first, last) < _NEARLY_STILL * np.maximum(first, last), end - begin)
+    at_stop = (speed_mm_s < _STILL_MM_S) | np.append(is_ramp, False) | np.append(False, is_ramp)
+    stops_s = float(lost_s[at_stop].sum())
+    return [("at stops", stops_s), ("at corners and on short moves", float(lost_s.sum()) - stops_s)]
 
 
 def is_worth_saying(lost_s: float, whole_s: float) -> bool:

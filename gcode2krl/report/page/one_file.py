@@ -96,7 +96,7 @@ def _script(has_path: bool, has_part: bool) -> str:
 
     Comments and indentation stay behind.
     """
-    names = (*_SCRIPTS, *(("part.js",) if has_part else ()), "page.js")
+    names = (*_SCRIPTS, *(("heights.js", "surface.js", "part.js") if has_part else ()), "page.js")
     scripts = [_COMMENT_OR_MARGIN.sub("", _text(HERE / name)) for name in names]
     if not has_path:
         return "\n".join(scripts)

@@ -6,6 +6,7 @@ const GOAL_MS = 30;
 const FEWEST_ROWS = 3000;
 const ROWS = { software: { moving: 12000, resting: 30000 }, hardware: { moving: 80000, resting: 250000 } };
 const IN_SIGHT = 1.3;
+const THICK = 9, OVER_PART = 3;  // pixels of the chosen line, which must not hide what it left
 const RAPID = -1, PALE = -2, NONE = -3;
 const PASS_COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"];
 
@@ -15,7 +16,7 @@ class Scene {
     this.columns = columns;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware(), preserveDrawingBuffer: false });
     this.software = isSoftware();
-    this.renderer.setClearColor(0xf4f6f8);
+    this.renderer.setClearColor(0xe8ecf0);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 1, 1e5);
     this.camera.up.set(0, 0, 1);
@@ -53,7 +54,7 @@ class Scene {
     this.material = lineMaterial(this.colours, this.software ? 2.2 : 2.6);
     this.fine = new Lines(this.material);
     this.coarse = new Lines(this.material);
-    const thick = lineMaterial(this.colours, 9);
+    const thick = lineMaterial(this.colours, THICK);
     thick.uniforms.is_flat.value = 1;
     thick.depthTest = false;
     this.current = new Lines(thick);
@@ -165,6 +166,7 @@ class Scene {
     this.fine.mesh.visible = isFine && !this.hidesPath;
     this.coarse.mesh.visible = !isFine && !this.hidesPath;
     this.part?.detail(!this.moving);
+    this.materials[1].uniforms.width.value = (this.hidesPath ? OVER_PART : THICK) / 2;
     this.drawn = (isFine ? this.fine : this.coarse).count;
     this.renderer.render(this.scene, this.camera);
     this.frames++;

@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from gcode2krl.report.page.losses import durations, lost_time, time_shares, worst_places, worst_windows
+from gcode2krl.report.page.losses import (
+    durations,
+    lost_parts,
+    lost_time,
+    time_shares,
+    worst_places,
+    worst_windows,
+)
 
 TIME = np.arange(0.0, 100.0 + 1e-9, 0.1)
 
@@ -59,3 +66,16 @@ def test_worst_places_lie_apart():
     assert [place.row for place in found] == [100, 900, 400]
     assert found[0].time_s == pytest.approx(10.0)
     assert worst_places(np.full(5, np.nan), TIME[:5], line[:5]) == []
+
+
+def test_lost_time_is_that_of_stops_and_that_of_the_rest():
+    """A stop with ramps of 1 s, and a stretch of 1 s at half the speed that is left and reached in 0.5 s."""
+    time_s = np.linspace(0.0, 10.0, 1001)
+    speed = np.interp(time_s, [0, 1, 3, 4, 5, 6, 7, 7.5, 8.5, 9, 10], [0, 10, 10, 0, 0, 10, 10, 5, 5, 10, 10])
+    lost_s = lost_time(time_s, speed, np.full(1001, 10.0))
+    (stops, at_stops_s), (rest, elsewhere_s) = lost_parts(lost_s, speed)
+    assert (stops, rest) == ("at stops", "at corners and on short moves")
+    assert at_stops_s == pytest.approx(0.5 + 0.5 + 1.0 + 0.5, abs=0.02)
+    assert elsewhere_s == pytest.approx(0.125 + 0.5 + 0.125, abs=0.02)
+    assert at_stops_s + elsewhere_s == pytest.approx(lost_s.sum())
+    assert lost_parts(np.zeros(1), np.zeros(1)) == []

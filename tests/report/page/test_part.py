@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl import predict
+from gcode2krl import load_cell, predict
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting import remove
 from gcode2krl.report.page import content_of, page, write_page
@@ -17,12 +17,21 @@ from gcode2krl.translation.page import part_of
 from tests.conftest import ROOT
 from tests.report.page.browser import opened_browser, opened_page
 
+FIVE = ROOT / "examples" / "five_axis"
 PIECE = ROOT / "examples" / "test_piece.nc"
 STOCK_MM = [[0.0, -100.0, -30.0], [300.0, 100.0, 0.0]]
 VOLUME = "report.part.volume()"
 FINISHED = (
     "(on) => { const box = document.getElementById('show-finished'); if (box.checked !== on) box.click(); }"
 )
+
+TWO_FRAMES = "new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(then)))"
+"""Then the camera stands where it goes."""
+PLACE = """(place) => {
+  const { scene } = report, box = scene.canvas.getBoundingClientRect();
+  const at = scene.marker.position.clone().fromArray(place).project(scene.camera);
+  return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +72,17 @@ def test_it_carries_every_event_and_the_error(prediction, history, content):
     assert error == pytest.approx(error_on(history, prediction).ravel(), abs=6e-4, nan_ok=True)
 
 
+def test_a_page_that_would_be_too_large_draws_fewer_samples(prediction, history, content, monkeypatch):
+    monkeypatch.setattr("gcode2krl.report.page.content.MOST_DATA", len(content.data) - 1)
+    fewer = content_of(prediction, part=history)
+    assert fewer.head["all"] == content.head["all"]
+    assert fewer.head["rows"] <= content.head["rows"] // 2
+    assert len(fewer.data) < 0.8 * len(content.data)
+    events = fewer.head["part"]["events"]
+    row = column(fewer.part, events["columns"], "row", events["rows"])
+    assert row.max() < fewer.head["rows"]
+
+
 def test_a_page_without_a_cut_carries_no_part(prediction):
     made = page(content_of(replace(prediction, forces=None, deflection=None)))
     assert part_of(replace(prediction, forces=None)) is None
@@ -84,13 +104,18 @@ def test_a_scale_ends_at_a_round_number_beyond_nearly_all():
 
 
 @pytest.fixture(scope="module")
-def window(content, tmp_path_factory):
+def browser():
+    with opened_browser() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def window(content, browser, tmp_path_factory):
     file = tmp_path_factory.mktemp("page") / "part.html"
     write_page(content, file)
-    with opened_browser() as browser:
-        made = opened_page(browser, file)
-        yield made
-        assert made.said == []
+    made = opened_page(browser, file)
+    yield made
+    assert made.said == []
 
 
 @pytest.mark.browser
@@ -109,20 +134,26 @@ def test_it_follows_the_slider_in_both_directions(window, history):
 
 
 @pytest.mark.browser
+def test_who_moves_the_slider_sees_part_and_robot_there(window):
+    window.evaluate(FINISHED, True)
+    assert not window.evaluate("report.robot.root.visible")
+    window.locator("#slider").fill("3000")
+    assert window.evaluate("report.row") == 3000
+    assert window.evaluate("report.robot.root.visible")
+    assert not window.locator("#show-finished").is_checked()
+    window.locator("#show-robot").uncheck()
+    window.locator("#slider").fill("2000")
+    assert not window.evaluate("report.robot.root.visible")
+
+
+@pytest.mark.browser
 def test_a_click_says_which_line_left_the_surface(window, prediction):
     """In the middle of the slot of line 26, at Y -50."""
     window.evaluate(FINISHED, True)
     window.evaluate("document.getElementById('look').scrollIntoView()")
-    window.locator("#show-robot").uncheck()
     window.locator("[data-view=top]").click()
-    # the camera stands where it goes from the next frame on
-    window.evaluate("new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(then)))")
-    place = """() => {
-      const { scene } = report, box = scene.canvas.getBoundingClientRect();
-      const at = scene.marker.position.clone().set(80, -50, -8.95).project(scene.camera);
-      return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
-    }"""
-    window.mouse.click(*window.evaluate(place))
+    window.evaluate(TWO_FRAMES)
+    window.mouse.click(*window.evaluate(PLACE, [80.0, -50.0, -8.95]))
     row = window.evaluate("report.row")
     assert prediction.toolpath.source_line[prediction.motion.move[row]] == 26
     assert abs(prediction.motion.position_mm[row, 0] - 80.0) < 9.0
@@ -139,4 +170,51 @@ def test_a_section_shows_what_lies_behind_it(window, axis):
     middle = np.mean(STOCK_MM, axis=0)
     assert cut[int(axis)] == pytest.approx(middle[int(axis)])
     window.locator("#section-axis").select_option("")
-    assert min(window.evaluate("report.part.material.uniforms.cut.value.toArray()")) > 1e6
+    assert np.abs(window.evaluate("report.part.material.uniforms.cut.value.toArray()")).min() > 1e6
+
+
+@pytest.fixture(scope="module")
+def five():
+    prediction = predict(FIVE / "five_axis.nc", load_cell(FIVE / "cell.toml"))
+    return prediction, part_of(prediction)
+
+
+@pytest.fixture(scope="module")
+def turned_window(five, browser, tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "five.html"
+    write_page(content_of(five[0], part=five[1]), file)
+    made = opened_page(browser, file)
+    yield made
+    assert made.said == []
+
+
+@pytest.mark.browser
+def test_under_a_turning_axis_it_follows_the_slider_in_both_directions(turned_window, five):
+    turned_window.evaluate(FINISHED, True)
+    assert turned_window.evaluate(VOLUME) == pytest.approx(five[1].volume_mm3(), rel=1e-4)
+    turned_window.evaluate(FINISHED, False)
+    for row in (3000, 4500, 1200, 0):
+        turned_window.evaluate("(row) => report.select(row)", row)
+        assert turned_window.evaluate(VOLUME) == pytest.approx(five[1].volume_mm3(row), rel=1e-4)
+
+
+@pytest.mark.browser
+def test_under_a_turning_axis_a_click_says_which_line_left_the_surface(turned_window, five):
+    """On the tilted face, which line 11 leaves."""
+    prediction, _ = five
+    turned_window.evaluate(FINISHED, True)
+    turned_window.evaluate("document.getElementById('look').scrollIntoView()")
+    turned_window.locator("[data-view=top]").click()
+    turned_window.evaluate(TWO_FRAMES)
+    turned_window.mouse.click(*turned_window.evaluate(PLACE, [20.0, -68.0, -11.5]))
+    note = turned_window.locator("#part-note").inner_text()
+    assert note.startswith("line 11 · ")
+    assert "error -" in note
+    row = turned_window.evaluate("report.row")
+    assert prediction.toolpath.source_line[prediction.motion.move[row]] == 11
+    turned_window.locator("#section-axis").select_option("2")
+    turned_window.mouse.click(*turned_window.evaluate(PLACE, [50.0, 40.0, 0.0]))
+    assert turned_window.locator("#part-note").inner_text() == ""  # through the section
+    turned_window.locator("#section-axis").select_option("")
+    turned_window.mouse.click(*turned_window.evaluate(PLACE, [50.0, 40.0, 0.0]))
+    assert turned_window.locator("#part-note").inner_text() == "not cut"
