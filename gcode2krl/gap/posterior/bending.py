@@ -54,9 +54,9 @@ class Bend:
 def bends_of(judged: Judgement, context: Context) -> list[Bend]:
     """Return the arm bent by the measured force, in the cut alone and in air too, where its model may fail.
 
-    Of the force link alone, where it is lost or the noise learnt has a slow part; else none.
+    Of the force link alone, where it is lost, or what may be noise of its sensor is slow or loud; else none.
     """
-    if judged.link is not FORCE or not (is_lost(judged) or _is_slow(judged)):
+    if judged.link is not FORCE or not (is_lost(judged) or _is_doubtful(judged)):
         return []
     base = FORCE.base(context)
     seen, bending = (*base, *judged.applied), (*base, *context.learned)
@@ -74,8 +74,8 @@ def bends_of(judged: Judgement, context: Context) -> list[Bend]:
 
 
 def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Bend]) -> list[Trace] | None:
-    """Return the traces of a force whose slow noise bends the arm, and so is no noise; else None."""
-    if not (bends and _is_slow(judged) and any(bend.is_seen for bend in bends)):
+    """Return the traces of a force whose slow or loud noise bends the arm, and so is no noise; else None."""
+    if not (bends and _is_doubtful(judged) and any(bend.is_seen for bend in bends)):
         return None
     return [replace(trace, is_shown_at_tip=True) for trace in traces]
 
@@ -91,8 +91,9 @@ def bent_by(bends: Sequence[Bend], context: Context) -> Context:
     return context.with_pairs(max(seen or bends[:1], key=lambda bend: bend.nats).pairs)
 
 
-def _is_slow(judged: Judgement) -> bool:
-    return any(noise.slow for noise in judged.examination.noise)
+def _is_doubtful(judged: Judgement) -> bool:
+    """Tell whether the noise has a slow part, or loud rows that its sensor may have had."""
+    return judged.size.is_loud or any(noise.slow for noise in judged.examination.noise)
 
 
 def _followed(

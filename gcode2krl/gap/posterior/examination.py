@@ -110,6 +110,11 @@ class Size:
         return loud or in_step or self.moments_off >= _LIMITS.model_off_rows
 
     @property
+    def is_loud(self) -> bool:
+        """Tell whether what is left is more than noise with its loud rows, which may be the instrument's."""
+        return self.excess > _as_many_deviations(self.freedom) * self.deviation
+
+    @property
     def share_left(self) -> float:
         """Return what is left of the structured gap, 0 to 1."""
         return float(np.clip(self.excess / max(self.excess_before, 1e-30), 0.0, 1.0))
