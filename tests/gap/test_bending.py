@@ -23,22 +23,16 @@ def wander(time_s, number):
     return np.stack([np.interp(time_s, hats_s, column) for column in values.T], axis=1)
 
 
-def pull(time_s, number):
-    """Return a force (n, 3) that grows for most of a second of one run and lets go."""
-    grows = (time_s > 6.0) & (time_s < 6.9) & (number == 1)
-    return np.outer(np.where(grows, time_s - 6.0, 0.0) * 150.0, [0.3, 0.8, 0.5])
-
-
-def added(*, bends, what=wander):
-    """Return what is added to the tables of a run: the force shows it, the tip where it bends."""
+def added(*, bends):
+    """Return what is added to the tables of a run: the force shows the wander, the tip where it bends."""
 
     def extra(name, values, stamps, signals, number):
         if name == "force_N":
-            return values + what(stamps, number)
+            return values + wander(stamps, number)
         if name != "position_mm" or not bends:
             return values
         more = replace(
-            signals.inputs, force_base_N=signals.force_base_N + what(signals.time_s, number), forces=None
+            signals.inputs, force_base_N=signals.force_base_N + wander(signals.time_s, number), forces=None
         )
         now, before = (simulate(each).tcp_base_mm for each in (more, replace(signals.inputs, forces=None)))
         moved = replace(signals, tcp_base_mm=now - before)
@@ -85,9 +79,3 @@ def test_the_tip_is_not_told_of_what_is_the_forces_or_the_sensors(case):
     _, gap, _ = case
     tip = link(gap, "mechanics")
     assert tip.rms_before == pytest.approx(tip.floor, rel=0.05)
-
-
-def test_a_pull_in_one_run_is_a_gap_of_the_force():
-    """Its rows are loud, which a burst of the sensor alone may be."""
-    gap = diagnose(prediction(), runs([], extra=added(bends=True, what=pull)))
-    assert link(gap, "force").verdict == "unexplained"

@@ -47,3 +47,15 @@ def calm(generator):
 @pytest.mark.parametrize(("more", "is_gap"), [(shakes, True), (bursts, False), (calm, False)])
 def test_what_is_louder_in_the_cut_alone_is_a_gap(more, is_gap):
     assert gap_of(more).significant == is_gap
+
+
+def test_what_is_loud_for_a_moment_alone_is_asked_about_and_no_gap_by_itself():
+    """A burst of one instrument, or what another one tells of."""
+
+    def burst(generator):
+        return 8.0 * SIGMA_MM * (np.abs(INPUTS.time_s - 5.0) < 0.4) * generator.standard_normal(COUNT)
+
+    size = gap_of(burst)
+    assert size.is_loud
+    assert not size.significant
+    assert not gap_of(calm).is_loud

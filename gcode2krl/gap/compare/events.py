@@ -423,18 +423,28 @@ def _in_step(
         [bool(rows[each.first : each.last].any()) for each in spans]
         for spans, rows in zip(stretches, chosen, strict=True)
     ]
-    # by its middle row, since a long stretch touches chosen rows more often than a row is chosen
-    middles = [
-        bool(rows[(each.first + each.last) // 2])
-        for own, rows in zip(stretches, chosen, strict=True)
-        for each in own
+    hits = [
+        (hit, bool(rows[(each.first + each.last) // 2]), each.last - each.first)
+        for spans, rows, own in zip(stretches, chosen, inside, strict=True)
+        for each, hit in zip(spans, own, strict=True)
         if not _is_outlier(each)
     ]
-    counted, share = sum(middles), float(np.mean(np.concatenate(list(chosen))))
-    chance = bdtrc(counted - 1, len(middles), share) if counted else 1.0
-    if counted >= least and chance < _LIMITS.in_step_p:
-        return inside
+    # A long stretch touches chosen rows more often than a row is chosen. Where these are rare and short its
+    # middle tells more; where it rings on after them, that it touches them.
+    touching, middles, lengths = (list(each) for each in zip(*hits, strict=True)) if hits else ([], [], [])
+    touched = float(np.mean([_touched(chosen, length) for length in lengths])) if lengths else 1.0
+    row_share = float(np.mean(np.concatenate(list(chosen))))
+    for counted, share in ((sum(touching), touched), (sum(middles), row_share)):
+        chance = bdtrc(counted - 1, len(hits), share) if counted else 1.0
+        if counted >= least and chance < _LIMITS.in_step_p:
+            return inside
     return [[False] * len(own) for own in stretches]
+
+
+def _touched(chosen: Sequence[Bools], length: int) -> float:
+    """Return the share of the stretches of so many rows, anywhere in the traces, that have a chosen row."""
+    counts = [np.concatenate([np.zeros(length, dtype=np.int64), np.cumsum(rows)]) for rows in chosen]
+    return float(np.mean(np.concatenate([each[length:] > each[:-length] for each in counts])))
 
 
 def command_changes(trace: Trace) -> Bools:
