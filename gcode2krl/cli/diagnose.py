@@ -106,7 +106,7 @@ def _written(
     """Write the page and the pictures that are asked for; return the files."""
     if html is None and plot is None:
         return []
-    from gcode2krl.gap.answer.page import write_page, write_pictures
+    from gcode2krl.gap.answer.drawing import write_page, write_pictures
 
     written = []
     with console.stage("drawing"):

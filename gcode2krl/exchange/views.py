@@ -11,7 +11,7 @@ VIEWS = {
     "prediction figure": "gcode2krl.figures:figure_of",
     "gap words": "gcode2krl.gap.answer.words:gap_words",
     "gap page": "gcode2krl.gap.answer.words:gap_html",
-    "gap figure": "gcode2krl.gap.answer.page:figure_of_run",
+    "gap figure": "gcode2krl.gap.answer.drawing:figure_of_run",
 }
 """What is shown to module and function."""
 

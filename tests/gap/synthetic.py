@@ -209,6 +209,16 @@ def _run(
     return Run(f"run-{number + 1}", Path(f"run-{number + 1}"), RunHead(), **made)
 
 
+def bent(values: np.ndarray, stamps: np.ndarray, signals: Any, more_N: np.ndarray) -> np.ndarray:
+    """Return tips (n, 3) at some stamps of an arm that more force (m, 3) bends."""
+    from gcode2krl.gap.compare.interpolation import interpolate
+
+    plain = replace(signals.inputs, forces=None)
+    loaded = replace(plain, force_base_N=signals.force_base_N + more_N)
+    now, before = (simulate(inputs).tcp_base_mm for inputs in (loaded, plain))
+    return values + interpolate(replace(signals, tcp_base_mm=now - before), "tcp_base_mm", stamps)
+
+
 def write_log(run: Run, file: Path) -> Path:
     """Write the actual joints of a run as people have them: Time, Axis1 … Axis6."""
     import polars as pl

@@ -1,15 +1,11 @@
 """A force that bends the arm is there; one that the sensor alone shows is the sensor's, noise or error."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from gcode2krl.effects import simulate
-from gcode2krl.gap.compare.interpolation import interpolate
 from gcode2krl.gap.diagnosis import diagnose
 from gcode2krl.gap.posterior import bending
-from tests.gap.synthetic import prediction, runs
+from tests.gap.synthetic import bent, prediction, runs
 
 pytestmark = pytest.mark.slow
 SIGMA_N = 30.0
@@ -31,12 +27,7 @@ def added(*, bends):
             return values + wander(stamps, number)
         if name != "position_mm" or not bends:
             return values
-        more = replace(
-            signals.inputs, force_base_N=signals.force_base_N + wander(signals.time_s, number), forces=None
-        )
-        now, before = (simulate(each).tcp_base_mm for each in (more, replace(signals.inputs, forces=None)))
-        moved = replace(signals, tcp_base_mm=now - before)
-        return values + interpolate(moved, "tcp_base_mm", stamps)
+        return bent(values, stamps, signals, wander(signals.time_s, number))
 
     return extra
 

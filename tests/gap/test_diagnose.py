@@ -9,7 +9,7 @@ import pytest
 from gcode2krl.gap import Gap, diagnose, text_report
 from gcode2krl.gap.answer.result import SCHEMA, EffectAt
 from gcode2krl.runs import RunHead
-from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, runs
+from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, bent, prediction, runs
 
 pytestmark = pytest.mark.slow
 
@@ -208,11 +208,17 @@ def test_every_cause_of_the_library_has_a_link():
 def test_a_collision_is_told_with_moment_line_and_force_and_what_it_left_behind():
     """A blow of 1.1 kN in the second run, by which A2 slips by 0.0225 deg."""
 
-    def struck(name, values, stamps, signals, number):
-        since = (stamps - 8.0) / 0.05
+    def blow_N(time_s):
+        since = (time_s - 8.0) / 0.05
         pulse = np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
-        blow_N = 1100.0 * pulse[:, None] * np.array([0.6, 0.0, 0.8])
-        return values + blow_N if name == "force_N" and number == 1 else values
+        return 1100.0 * pulse[:, None] * np.array([0.6, 0.0, 0.8])
+
+    def struck(name, values, stamps, signals, number):
+        if number != 1 or name not in ("force_N", "position_mm"):
+            return values
+        if name == "force_N":
+            return values + blow_N(stamps)
+        return bent(values, stamps, signals, blow_N(signals.time_s))
 
     slipped = applied("step:target=A2,at_s=1808.025,size_deg=0.0225")
     gap = diagnose(prediction(), runs(slipped, extra=struck, load_encoders=True))

@@ -8,7 +8,7 @@ import lxml.html
 import pytest
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.answer.page import page, write_page
+from gcode2krl.gap.answer.drawing import page, write_page
 from gcode2krl.gap.answer.result import (
     Course,
     EffectAt,

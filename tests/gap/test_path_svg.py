@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.answer.page import points, rows_of, scale_colours, strip, views
+from gcode2krl.gap.answer.drawing import points, rows_of, scale_colours, strip, views
 from tests.gap.answered import STRETCH, evidence, run_evidence
 
 

@@ -8,8 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gap.answer.evidence import Against
-from gcode2krl.gap.answer.page import (
+from gcode2krl.gap.answer.drawing import (
     draw_dependence,
     draw_path,
     draw_time,
@@ -20,6 +19,7 @@ from gcode2krl.gap.answer.page import (
     views_of,
     write_pictures,
 )
+from gcode2krl.gap.answer.evidence import Against
 from gcode2krl.gap.answer.result import Where
 from tests.gap.answered import GAP, STRETCH, TIME_S, evidence, run_evidence
 

@@ -350,8 +350,8 @@ def headline(gap: Gap) -> str:
 def _hit(gap: Gap) -> str:
     """Return what happened in a moment, and what it left behind; nothing where nothing did.
 
-    What a force sensor and the tip, or a joint from then on, show at once was a blow; one reading alone may
-    be one of its instrument.
+    What a force sensor and the tip, or a joint from then on, named or not, show at once was a blow; one
+    reading alone may be one of its instrument.
     """
     impulses = [each for each in gap.events if each.what == IMPULSE]
     event = max(impulses, key=lambda each: (each.link == "force", each.size), default=None)
@@ -361,7 +361,11 @@ def _hit(gap: Gap) -> str:
     at = f"at {event.t_s:.2f} s of {event.run}, line {event.line}"
     others = [each for each in gap.events if each.what != "burst" and each.link != event.link]
     together = [each for each in others if each.run == event.run and _is_near(each.t_s, event.t_s)]
-    if event.link == "force" and (step or together):
+    stays = any(
+        each.form == "step" and each.run == event.run and _is_near(each.at_time_s or 0.0, event.t_s)
+        for each in gap.unexplained.depends_on
+    )
+    if event.link == "force" and (step or together or stays):
         said = f"The tool hit something {at}: {_force(event.size)}"
     else:
         where = "force" if event.link == "force" else f"{event.link} signal"
