@@ -63,7 +63,7 @@ def test_a_number_without_a_reason_is_no_threshold() -> None:
         list(listed(Rooms()))
 
 
-@pytest.mark.parametrize("place", ["compare/slips.py", "posterior/set_up.py", "answer/[!p]*.py"])
+@pytest.mark.parametrize("place", ["compare/slips.py", "posterior/set_up.py", "answer/[!d]*.py"])
 def test_a_room_keeps_no_numbers_beside_the_table(place: str) -> None:
     for file in sorted((ROOT / "gcode2krl" / "gap").glob(place)):
         for node in ast.parse(file.read_text("utf-8")).body:
