@@ -133,7 +133,8 @@ _AXIS_TURNS = Issue(
     "note",
     "axis-turns",
     0,
-    f"the tool axis turns: forces are less sure by {TURNED_BAND:.0%}, and peaks are upper bounds",
+    f"the tool axis turns: forces there were never compared with a measured cut, are less sure by "
+    f"{TURNED_BAND:.0%}, and peaks are upper bounds",
 )
 _APPROACH_MM = 1e-3
 _ARC_COLUMNS = 6

@@ -64,13 +64,13 @@ def bends_of(judged: Judgement, context: Context) -> list[Bend]:
         tuple(pair.with_measured_load(seen, bending, in_air=in_air) for pair in context.pairs)
         for in_air in (False, True)
     ]
-    own = MECHANICS.base(context)
-    traces = MECHANICS.traces(context.pairs, own)
+    of_tip = MECHANICS.base(context)
+    traces = MECHANICS.traces(context.pairs, of_tip)
     if not traces or traces[0].still:
         return [Bend(each, 0.0, 0.0, np.inf) for each in bent]
     question = replace(question_of(MECHANICS, traces, context), blocks=())
     nuisance = nuisance_for(traces, question, Signatures())
-    return [Bend(each, *_followed(traces, MECHANICS.traces(each, own), nuisance)) for each in bent]
+    return [Bend(each, *_followed(traces, MECHANICS.traces(each, of_tip), nuisance)) for each in bent]
 
 
 def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Bend]) -> list[Trace] | None:
@@ -99,22 +99,26 @@ def _is_doubtful(judged: Judgement) -> bool:
 def _followed(
     traces: Sequence[Trace], bent: Sequence[Trace], nuisance: Sequence[Sequence[Nuisance]]
 ) -> tuple[float, float, float]:
-    """Return how much of what the load would do the tip does, its evidence in nats, and its deviation."""
-    moved = [there.nominal - trace.nominal for trace, there in zip(traces, bent, strict=True)]
-    if not any(each.any() for each in moved):
+    """Return the gain g of r = g·X + noise, its evidence in nats, and its standard deviation.
+
+    ``traces`` are tips beside the predicted load, ``bent`` the same beside the measured one. g by least
+    squares, the evidence ½·(|r|² - |r - g·X|²), both over how much more than noise is left.
+    """
+    ways = [there.nominal - trace.nominal for trace, there in zip(traces, bent, strict=True)]
+    if not any(way.any() for way in ways):
         return 0.0, 0.0, np.inf
-    columns = [np.ascontiguousarray(each.T)[:, :, None] for each in moved]
+    columns = [np.ascontiguousarray(way.T)[:, :, None] for way in ways]
     likelihood = Likelihood(traces, nuisance, noise_of(traces, columns, nuisance))
-    rest, way = (_beside_mismatch(likelihood, each) for each in ([trace.residual for trace in traces], moved))
-    power = max(float(way @ way), 1e-30)
-    gain = float(rest @ way) / power
-    left = float(np.sum((rest - gain * way) ** 2))
-    inflation = max(1.0, left / len(rest))
-    return gain, 0.5 * (float(rest @ rest) - left) / inflation, float(np.sqrt(inflation / power))
+    r = _beside_mismatch(likelihood, [trace.residual for trace in traces])
+    x = _beside_mismatch(likelihood, ways)
+    power = max(float(x @ x), 1e-30)
+    gain = float(r @ x) / power
+    unexplained = float(np.sum((r - gain * x) ** 2))
+    inflation = max(1.0, unexplained / len(r))
+    return gain, 0.5 * (float(r @ r) - unexplained) / inflation, float(np.sqrt(inflation / power))
 
 
 def _beside_mismatch(likelihood: Likelihood, values: Sequence[Floats]) -> Floats:
-    """Return values (n, k) of all traces, whitened, less the mismatch that fits them best."""
-    own, shared = fitted_mismatch(likelihood, values)
-    left = [value - a - b for value, a, b in zip(values, own, shared, strict=True)]
-    return likelihood.whiten(left)
+    """Return values (n, k) of all traces, whitened (v,), less the mismatch that fits them best."""
+    of_runs, shared = fitted_mismatch(likelihood, values)
+    return likelihood.whiten([value - a - b for value, a, b in zip(values, of_runs, shared, strict=True)])

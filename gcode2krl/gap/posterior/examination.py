@@ -220,37 +220,37 @@ def _rough_joint(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     return share if share > _LIMITS.rough_joint else 0.0
 
 
-def _loud_in_cut(likelihood: Likelihood, left: Sequence[Floats]) -> float:
+def _loud_in_cut(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     """Return by how much louder a tip is in the cut than in air, over that; 0 where it may be chance.
 
-    A tracker knows nothing of the cut: what is louder there shakes the tip (a rank test, Mann & Whitney 1947,
-    over stretches as long as an event).
+    Residuals (n, k) of each trace. A tracker knows nothing of the cut: what is louder there shakes the tip (a
+    rank test, Mann & Whitney 1947, over stretches as long as an event).
     """
     from scipy.stats import mannwhitneyu
 
-    if not likelihood.traces[0].link.of_tip or likelihood.traces[0].still:
+    traces, components = likelihood.traces, len(likelihood.noise)
+    if not traces[0].link.of_tip or traces[0].still:
         return 0.0
     loudest = 0.0
-    for j in range(len(likelihood.noise)):
+    for j in range(components):
         cut, air = [], []
-        for number, rest in enumerate(left):
-            trace = likelihood.traces[number]
+        for number, (trace, residual) in enumerate(zip(traces, residuals, strict=True)):
             rows = nearest_rows(trace.inputs.time_s, trace.time_s)
-            cuts = np.any(trace.inputs.force_base_N[rows], axis=1)
-            block = ((trace.time_s - trace.time_s[0]) / _EVENT_S).astype(np.int64)
-            squares = likelihood.white(number, j, rest[:, [j]])[:, 0] ** 2
-            count = np.maximum(np.bincount(block), 1)
-            mean = np.bincount(block, weights=squares) / count
-            share = np.bincount(block, weights=cuts) / count
-            is_seen = np.bincount(block) > 0
-            cut.append(mean[is_seen & (share == 1.0)])
-            air.append(mean[is_seen & (share == 0.0)])
+            is_cutting = np.any(trace.inputs.force_base_N[rows], axis=1)
+            stretch = ((trace.time_s - trace.time_s[0]) / _EVENT_S).astype(np.int64)
+            squares = likelihood.white(number, j, residual[:, [j]])[:, 0] ** 2
+            count = np.bincount(stretch)
+            power = np.bincount(stretch, weights=squares) / np.maximum(count, 1)
+            cutting = np.bincount(stretch, weights=is_cutting)
+            # what is partly in the cut tells of neither
+            cut.append(power[(count > 0) & (cutting == count)])
+            air.append(power[(count > 0) & (cutting == 0)])
         in_cut, in_air = np.concatenate(cut), np.concatenate(air)
         if min(len(in_cut), len(in_air)) < _LEAST_STRETCHES:
             continue
-        more = float(np.median(in_cut)) / max(float(np.median(in_air)), 1e-30) - 1.0
-        if mannwhitneyu(in_cut, in_air, alternative="greater").pvalue < _LIMITS.loud_p / 3.0:
-            loudest = max(loudest, more)
+        louder = float(np.median(in_cut)) / max(float(np.median(in_air)), 1e-30) - 1.0
+        if mannwhitneyu(in_cut, in_air, alternative="greater").pvalue < _LIMITS.loud_p / components:
+            loudest = max(loudest, louder)
     return loudest if loudest > _LIMITS.rough_joint else 0.0
 
 
