@@ -135,6 +135,7 @@ _AXIS_TURNS = Issue(
     0,
     f"the tool axis turns: forces there were never compared with a measured cut, are less sure by "
     f"{TURNED_BAND:.0%}, and peaks are upper bounds",
+    "lean a ball forward rather than back: its tip drags less",
 )
 _APPROACH_MM = 1e-3
 _ARC_COLUMNS = 6
