@@ -153,9 +153,12 @@ def kill_a_worker(process: subprocess.Popen) -> None:
         os.kill(children[0], signal.SIGKILL)
 
 
-def interrupt_later(seconds: float) -> Callable[[subprocess.Popen], None]:
+def interrupt_after(out: Path, programs: int) -> Callable[[subprocess.Popen], None]:
+    """Return what interrupts a batch as soon as so many programs stand in its folder."""
+
     def interrupt(process: subprocess.Popen) -> None:
-        time.sleep(seconds)
+        while process.poll() is None and len(list(out.rglob("*.src"))) < programs:
+            time.sleep(0.02)
         process.send_signal(signal.SIGINT)
 
     return interrupt
@@ -219,7 +222,7 @@ def run(bench: Bench, dask: bool, with_loop: bool) -> None:
         bench.batch("a worker killed", "out-killed", "--no-cache", "--processes", "2", disturb=kill_a_worker)
     if os.name == "posix":
         shutil.rmtree(bench.folder / "cache")
-        stop = interrupt_later(0.3 * two.seconds)
+        stop = interrupt_after(bench.folder / "out-resumed", max(1, two.parts // 3))
         bench.batch("interrupted after about a third", "out-resumed", "--processes", "2", disturb=stop)
         bench.batch("the same command again", "out-resumed", "--processes", "2")
     if dask:
