@@ -14,7 +14,8 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
-from gcode2krl.krc4.motion import Chain, build_chain, plan
+from gcode2krl.krc4.laws import parabola_distance
+from gcode2krl.krc4.motion import Chain, plan, with_corners
 from gcode2krl.krc4.profile import Profile
 from gcode2krl.tables import Targets
 
@@ -35,14 +36,11 @@ class _Reading(NamedTuple):
 def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
     """Return the one note on corners whose path or time depends on what a KRC4 is assumed to do."""
     doubts: list[tuple[float, int, str]] = []
-    error_mm = chain.corner_error_mm()
     for reading in _readings(targets, chain, cell):
-        other_mm, other_s = reading.chain.corner_error_mm(), plan(reading.chain, cell).total_s
-        moved_mm = np.abs(other_mm - error_mm)
-        worst = int(np.argmax(moved_mm))
-        far, share = moved_mm[worst] / PATH_MM, abs(other_s / profile.total_s - 1.0) / TIME_SHARE
-        line = int(chain.source_line[worst]) if far > 1.0 else 0
-        off = f"{other_mm[worst]:.2f} mm off the corner of line {line} instead of {error_mm[worst]:.2f} mm"
+        other_s = plan(reading.chain, cell).total_s
+        share = abs(other_s / profile.total_s - 1.0) / TIME_SHARE
+        far, line, other_mm, error_mm = _furthest(chain, reading.chain)
+        off = f"{other_mm:.2f} mm off the corner of line {line} instead of {error_mm:.2f} mm"
         lasts = f"the program lasts {other_s:.1f} s instead of {profile.total_s:.1f} s"
         parts = [words for words, size in ((f"the path is {off}", far), (lasts, share)) if size > 1.0]
         if parts:
@@ -58,28 +56,49 @@ def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) 
     return (Issue("note", "corner-undecided", line, sentence, remedy),)
 
 
+def _furthest(chain: Chain, other: Chain) -> tuple[float, int, float, float]:
+    """Return how far the corner that moves most moves over what counts, its line, its errors in mm; else 0."""
+    if other.blend_mm is chain.blend_mm:
+        return 0.0, 0, 0.0, 0.0
+    ours, others = chain.corner_distances_mm(), other.corner_distances_mm()
+    longest = np.maximum(np.maximum(*ours), np.maximum(*others))
+    changed = (ours[0] != others[0]) | (ours[1] != others[1])
+    # no corner is further from its parabola than half the longer distance times cos(alpha/2)
+    corners = np.flatnonzero(changed & (longest * chain.cos_half / 2.0 > PATH_MM))
+    error_mm, other_mm = (
+        parabola_distance(before[corners], after[corners], chain.cos_half[corners])
+        for before, after in (ours, others)
+    )
+    moved = np.abs(other_mm - error_mm) / PATH_MM
+    if moved.max(initial=0.0) <= 1.0:
+        return 0.0, 0, 0.0, 0.0
+    worst = int(np.argmax(moved))
+    line = int(chain.source_line[corners[worst]])
+    return float(moved[worst]), line, float(other_mm[worst]), float(error_mm[worst])
+
+
 def _readings(targets: Targets, chain: Chain, cell: Cell) -> Iterator[_Reading]:
     """Yield the other readings of the corners that join unequal lines; none where all are equal."""
     blended = chain.blend_mm[:-1] > 0.0
+    cdis = targets.cdis_mm[chain.first + 1 :][: len(chain.blend_mm)]
     speed = chain.speed_mm_s * chain.scale
     unequal = int(np.count_nonzero(blended & (speed[1:] != speed[:-1])))
     if unequal:
-        never = build_chain(targets, cell, "never")
+        never = with_corners(chain, cdis, cell, "never")
         yield _Reading(unequal, "unequal speeds: if each were at the slower one", never)
-        always = build_chain(targets, cell, "always")
+        always = with_corners(chain, cdis, cell, "always")
         yield _Reading(unequal, "unequal speeds: if each made the change of speed", always)
     acceleration = chain.acceleration_mm_s2 * chain.scale
     unequal = int(np.count_nonzero(blended & (acceleration[1:] != acceleration[:-1])))
     if unequal:
         lower = replace(chain, acceleration_mm_s2=_lower(acceleration, ~chain.stop[:-1]) / chain.scale)
         yield _Reading(unequal, "unequal accelerations: if the lower one held for both lines", lower)
-    cdis = targets.cdis_mm
-    smaller = np.where((cdis[:-1] > 0.0) & (cdis[1:] > 0.0), np.minimum(cdis[:-1], cdis[1:]), cdis[:-1])
-    ends = slice(chain.first + 1, chain.first + len(chain.blend_mm))
-    unequal = int(np.count_nonzero(blended & (smaller[ends] < cdis[ends])))
+    smaller = cdis.copy()
+    both = np.flatnonzero(blended & (cdis[1:] > 0.0))
+    smaller[both] = np.minimum(cdis[both], cdis[both + 1])
+    unequal = int(np.count_nonzero(smaller < cdis))
     if unequal:
-        least = replace(targets, cdis_mm=np.append(smaller, cdis[-1:]))
-        yield _Reading(unequal, "unequal CDIS: if the smaller one held", build_chain(least, cell))
+        yield _Reading(unequal, "unequal CDIS: if the smaller one held", with_corners(chain, smaller, cell))
 
 
 def _lower(acceleration: Floats, joined: Bools) -> Floats:

@@ -68,11 +68,15 @@ class Chain:
 
     def corner_error_mm(self) -> Floats:
         """Return the corner errors (n,): the distance of the vertex to the parabola."""
-        d, error = self.blend_mm, np.zeros(len(self.blend_mm))
-        corners = np.flatnonzero(d > 0)
-        before, after = d[corners] * self.scale[corners], d[corners] * self.scale[corners + 1]
-        error[corners] = parabola_distance(before, after, self.cos_half[corners])
+        error = np.zeros(len(self.blend_mm))
+        corners = np.flatnonzero(self.blend_mm > 0)
+        before, after = self.corner_distances_mm()
+        error[corners] = parabola_distance(before[corners], after[corners], self.cos_half[corners])
         return error
+
+    def corner_distances_mm(self) -> tuple[Floats, Floats]:
+        """Return the distances (n,) at which each parabola leaves its move and joins the next; 0 at a stop."""
+        return self.blend_mm * self.scale, self.blend_mm * np.append(self.scale[1:], self.scale[-1])
 
 
 def build_chain(targets: Targets, cell: Cell, changes: Changes = "where it fits") -> Chain:
@@ -117,6 +121,29 @@ def build_chain(targets: Targets, cell: Cell, changes: Changes = "where it fits"
         scale=scale,
         from_external=from_external,
         to_external=to_external,
+    )
+
+
+def with_corners(chain: Chain, cdis_mm: Floats, cell: Cell, changes: Changes = "where it fits") -> Chain:
+    """Return the chain with other CDIS, none larger, or other corners that make a change of speed.
+
+    ``cdis_mm`` (n,) at the end of each move; ``changes`` as in `build_chain`.
+    """
+    scale = chain.scale
+    length, speed, acceleration = (
+        column * scale for column in (chain.length_mm, chain.speed_mm_s, chain.acceleration_mm_s2)
+    )
+    d = np.zeros(len(length))
+    corners = np.flatnonzero(chain.blend_mm > 0.0)
+    d[corners] = np.minimum(cdis_mm[corners], np.minimum(length[corners], length[corners + 1]) / 2)
+    scale = _scales(length, speed, acceleration, d, cdis_mm, chain.stop, cell, changes)
+    return replace(
+        chain,
+        length_mm=_over(length, scale),
+        speed_mm_s=_over(speed, scale),
+        acceleration_mm_s2=_over(acceleration, scale),
+        blend_mm=d,
+        scale=scale,
     )
 
 
