@@ -19,30 +19,22 @@ Left out: regeneration (`cutting.lobes`), mass that differs with direction, damp
 part of the force that follows the tip's velocity, the bending of spindle and tool themselves.
 """
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
-from gcode2krl.arrays import Bools, Floats, Ints
+from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compliance.deflection import displace
 
 DAMPING = 0.02
 """Damping ratio of the arm's modes, an assumption: tap tests of milling robots find 0.01 to 0.05."""
 MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
-_LEAST_GAIN, _STEP = 1.0 / 16.0, math.sqrt(2.0)
-_HALVINGS = 7
-_ONE, _TWO = np.array([1, 2, 0]), np.array([2, 0, 1])
-_MINORS = [
-    (rows[None, :], columns[:, None])
-    for rows, columns in ((_ONE, _ONE), (_TWO, _TWO), (_ONE, _TWO), (_TWO, _ONE))
-]
-"""The numbers of a 3x3 matrix of which the minors of its transpose are made."""
 _LOAD_N = 1.0
 _LEAST_MM_N = 1e-12
 """Flexibility of a rigid arm, so that it has a stiffness."""
+_coupling_index = core_function("compliance_coupling_index", FLOATS, FLOATS, FLOATS, FLOAT, OUT_FLOATS)
 
 
 def tip_stiffness(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
@@ -80,59 +72,7 @@ def coupling_index(
     process = np.where(finite[:, None, None], process_N_mm / scale, 0.0)
     values, modes = np.linalg.eigh(stiffness)
     drag = 2.0 * damping * (modes * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ modes.transpose(0, 2, 1)
-
-    def grows(rows: Ints, gain: Floats) -> Bools:
-        return ~_dies_out(drag[rows], stiffness[rows] - gain[:, None, None] * process[rows])
-
-    low, high = np.zeros(len(scale)), np.full(len(scale), np.inf)
-    gain = _LEAST_GAIN
-    while gain <= most_gain * (1.0 + 1e-9):
-        rows = np.flatnonzero(np.isinf(high))
-        unstable = grows(rows, np.full(len(rows), gain))
-        high[rows[unstable]], low[rows[~unstable]] = gain, gain
-        gain *= _STEP
-    swings = np.isfinite(high)
-    rows = np.flatnonzero(swings)
-    for _ in range(_HALVINGS):
-        middle = (low[rows] + high[rows]) / 2.0
-        unstable = grows(rows, middle)
-        high[rows[unstable]], low[rows[~unstable]] = middle[unstable], middle[~unstable]
-    return np.where(finite, np.where(swings, 1.0 / np.where(swings, high, 1.0), 0.0), np.nan)
-
-
-def _dies_out(drag: Floats, stiffness: Floats) -> Bools:
-    """Tell (n,) where all solutions of u'' + C·u' + A·u = 0 die out, for C, A (n, 3, 3).
-
-    Routh's array of det(s²·I + s·C + A), whose first column has no change of sign (Routh 1877). The
-    polynomial's coefficients are the mixed principal minors of C and A.
-    """
-    rows = np.zeros((7, len(drag)))
-    sums = np.trace(drag, axis1=1, axis2=2), np.trace(stiffness, axis1=1, axis2=2)
-    minors = [_adjugate(each) for each in (drag, stiffness)]
-    rows[0], rows[1] = 1.0, sums[0]
-    rows[2] = np.trace(minors[0], axis1=1, axis2=2) + sums[1]
-    rows[3] = _det(drag, minors[0]) + sums[0] * sums[1] - _along(drag, stiffness)
-    rows[4] = np.trace(minors[1], axis1=1, axis2=2) + _along(minors[0], stiffness)
-    rows[5], rows[6] = _along(minors[1], drag), _det(stiffness, minors[1])
-    nothing = np.zeros(len(drag))
-    upper, lower, stable = rows[::2], np.vstack([rows[1::2], nothing]), np.ones(len(drag), dtype=np.bool_)
-    for _ in range(6):
-        stable &= lower[0] > 0.0
-        ratio = upper[0] / np.where(stable, lower[0], 1.0)
-        upper, lower = lower, np.vstack([upper[1:] - ratio * lower[1:], nothing])
-    return stable
-
-
-def _along(a: Floats, b: Floats) -> Floats:
-    """Return the traces (n,) of products of matrices (n, 3, 3)."""
-    return np.asarray(np.einsum("nij,nji->n", a, b))
-
-
-def _det(matrix: Floats, adjugate: Floats) -> Floats:
-    return np.asarray(np.einsum("nj,nj->n", matrix[:, 0], adjugate[:, :, 0]))
-
-
-def _adjugate(matrix: Floats) -> Floats:
-    """Return the adjugates of matrices (n, 3, 3)."""
-    a, b, c, d = (matrix[:, rows, columns] for rows, columns in _MINORS)
-    return a * b - c * d
+    index = np.empty(len(scale))
+    flat = (np.ascontiguousarray(matrices.reshape(-1, 9)) for matrices in (drag, stiffness, process))
+    _coupling_index(*flat, float(most_gain), index)
+    return np.where(finite, index, np.nan)
