@@ -24,6 +24,9 @@ PATH_MM = 0.05
 TIME_SHARE = 0.01
 """Change of the time, as a share of it, from which on a reading is told."""
 
+_WORTH_A_PLAN = 0.3
+"""Change of the time without a look-ahead, over what is told, from which on it is planned with one."""
+
 
 class _Reading(NamedTuple):
     """The motion under another assumption."""
@@ -36,9 +39,14 @@ class _Reading(NamedTuple):
 def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
     """Return the one note on corners whose path or time depends on what a KRC4 is assumed to do."""
     doubts: list[tuple[float, int, str]] = []
+    free_s = plan(chain, cell, look_ahead=False).total_s
     for reading in _readings(targets, chain, cell):
-        other_s = plan(reading.chain, cell).total_s
+        # a look-ahead costs far more work, and slows both so that corners matter less
+        other_s = plan(reading.chain, cell, look_ahead=False).total_s + profile.total_s - free_s
         share = abs(other_s / profile.total_s - 1.0) / TIME_SHARE
+        if share > _WORTH_A_PLAN:
+            other_s = plan(reading.chain, cell).total_s
+            share = abs(other_s / profile.total_s - 1.0) / TIME_SHARE
         far, line, other_mm, error_mm = _furthest(chain, reading.chain)
         off = f"{other_mm:.2f} mm off the corner of line {line} instead of {error_mm:.2f} mm"
         lasts = f"the program lasts {other_s:.1f} s instead of {profile.total_s:.1f} s"
