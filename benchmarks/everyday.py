@@ -60,6 +60,7 @@ def main() -> None:
         home.mkdir()
         lines = part.read_bytes().count(b"\n")
         environment = {**os.environ, "HOME": str(home), "USERPROFILE": str(home)}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python keeps its bytecode
         python = sys.executable
         if not arguments.here:
             environment.pop("PYTHONPATH", None)

@@ -65,7 +65,7 @@ def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) 
 
 
 def _furthest(chain: Chain, other: Chain) -> tuple[float, int, float, float]:
-    """Return how far the corner that moves most moves over what counts, its line, its errors in mm; else 0."""
+    """Return the change of the corner that moves most over `PATH_MM`, its line and its errors in mm; or 0."""
     if other.blend_mm is chain.blend_mm:
         return 0.0, 0, 0.0, 0.0
     ours, others = chain.corner_distances_mm(), other.corner_distances_mm()

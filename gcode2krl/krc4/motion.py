@@ -75,7 +75,7 @@ class Chain:
         return error
 
     def corner_distances_mm(self) -> tuple[Floats, Floats]:
-        """Return the distances (n,) at which each parabola leaves its move and joins the next; 0 at a stop."""
+        """Return the distances (n,) before and behind each corner at which its parabola begins and ends."""
         return self.blend_mm * self.scale, self.blend_mm * np.append(self.scale[1:], self.scale[-1])
 
 
