@@ -104,19 +104,6 @@ def test_every_room_is_in_the_table():
     assert {room for room in rooms | gap if f"`{room}`" not in rows} == set()
 
 
-def test_what_does_not_exist_is_found():
-    assert place_of("gcode/reader.py") is None
-    assert place_of("gcode/read.py") == PACKAGE / "gcode" / "read.py"
-    assert {"read_gcode", "_Interpreter.feed", "_MOST_ISSUES"} <= names_in(PACKAGE / "gcode" / "read.py")
-    assert "move" in names_in(ROOT / "native" / "gcode" / "motion.c")
-    assert "moves" not in names_in(ROOT / "native" / "gcode" / "motion.c")
-    assert resolved("gcode2krl.gap.diagnosis.diagnose")
-    assert not resolved("gcode2krl.gap.diagnosis.nothing")
-    assert not resolved("gcode2krl.nothing")
-    assert len(NAMED) > 80
-    assert len(FILES) > 80
-
-
 def test_the_effect_of_the_guide_can_be_used_as_it_stands(tmp_path):
     text = DOCUMENTS[1].read_text(encoding="utf-8")
     (source,) = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.plant import masses, memory
+from tests.plant import memory
 from tests.plant.effects import LIBRARY, UNKNOWN
 from tests.plant.effects.open import brake_after_stop, oil_film, vacuum_lifts
-from tests.plant.robot import SLOW, Run, STEP_s, joint_torques, to_root
+from tests.plant.robot import SLOW, Run, STEP_s
 from tests.plant.scene import DEGREE, World
-from tests.plant.short import WORLD, driven, form, only
+from tests.plant.short import driven, form, only
 from tests.plant.signatures import Script
 
 WHOLE = "slots"
@@ -45,34 +45,6 @@ def test_all_axes_err_as_each_alone_does(name):
         np.testing.assert_array_equal(getattr(together, seen)[:, j], getattr(alone, seen)[:, j])
 
 
-def test_dead_time_shifts_and_does_not_deform():
-    _, run = only("dead_time", 0.02, "A1")
-    np.testing.assert_allclose(run.q_act[20:, 0], run.q_cmd[:-20, 0], atol=1e-12)
-    np.testing.assert_array_equal(run.q_act[:, 1], run.q_cmd[:, 1])
-
-
-def test_a_loop_without_all_of_its_feed_forward_is_late_and_catches_up():
-    values, run = only("servo_gain", 0.3, "A2")
-    off, speed = (run.q_act - run.q_cmd)[:, 1], run.rates(run.q_cmd[:, 1])
-    k_v, missing = values["k_v_per_s"], values["missing_share"]
-    wanted = -k_v * off - missing * speed  # e' = -k_v·e - missing·command'
-    np.testing.assert_allclose(run.rates(off)[5:-5], wanted[5:-5], atol=0.02 * np.abs(wanted).max())
-    assert np.abs(off[-1]) < 0.01 * np.abs(off).max()
-    slow = driven(form(LIBRARY["servo_gain"].others[0], 0.3, 1, "A2")[1])
-    assert np.abs(slow.q_act - slow.q_cmd)[-1, 1] < 0.01 * np.abs(off).max()
-
-
-def test_a_jerk_error_is_where_the_command_jerked():
-    values, run = only("jerk_feed_forward", 1e-6, "A1")
-    off = run.q_act[:, 0] - run.q_cmd[:, 0]
-    jerk = run.rates(run.rates(run.rates(run.q_cmd[:, 0])))
-    after = np.arange(0.0, 0.4, STEP_s) / values["settle_s"]
-    answer = after * np.exp(-after)  # of two lags to a blow
-    wanted = -values["s3"] * np.convolve(jerk, answer / answer.sum())[: len(jerk)]
-    assert np.corrcoef(off, wanted)[0, 1] > 0.99
-    assert np.std(off) == pytest.approx(np.std(wanted), rel=0.05)
-
-
 def test_a_current_limit_clips_the_acceleration_and_catches_up():
     _, run = only("current_limit", 0.5, "A1")
     push = [np.abs(np.diff(q[:, 0], 2)).max() / STEP_s**2 for q in (run.q_cmd, run.q_act)]
@@ -84,27 +56,6 @@ def test_a_current_limit_clips_the_acceleration_and_catches_up():
 def test_a_drive_that_may_push_as_hard_as_it_must_follows_exactly():
     x = np.cumsum(np.cumsum(np.random.default_rng(1).normal(size=500))) * 1e-6
     np.testing.assert_allclose(memory.limited(x, 1e9, 10.0, STEP_s), x, atol=1e-12)
-
-
-def test_a_belt_creeps_after_the_torque_of_its_joint():
-    size = 0.5
-    values, run = only("belt_wind_up", size, "A5")
-    torque = (joint_torques(run) + masses.joint_moments(run))[:, 4] / 1e6  # kN·m
-    crept = (run.q_load - run.q_act)[::SLOW, 4] / DEGREE
-    assert crept[0] == pytest.approx(size * torque[0], rel=1e-3)  # settled at the start
-    rate = np.gradient(crept, SLOW * STEP_s)
-    wanted = (size * torque - crept) / values["relax_s"]
-    assert np.corrcoef(rate[5:-5], wanted[5:-5])[0, 1] > 0.99
-    assert np.std(rate[5:-5]) == pytest.approx(np.std(wanted[5:-5]), rel=0.05)
-    with pytest.raises(ValueError, match="A1 is not a target"):
-        only("belt_wind_up", size, "A1")
-
-
-def test_a_coupling_moves_a3_with_a2():
-    values, run = only("axis_coupling", 1e-3)
-    off = (run.q_load - run.q_act)[:, 2]
-    assert np.polyfit(run.q_act[:, 1], off, 1)[0] == pytest.approx(values["ratio"])
-    assert np.abs(np.delete(run.q_load - run.q_act, 2, axis=1)).max() == 0.0
 
 
 def test_a_collision_pushes_once_and_leaves_a_slip(whole):
@@ -127,26 +78,6 @@ def test_a_collision_pushes_once_and_leaves_a_slip(whole):
     assert (later.q_load - whole.q_load)[0, 1] / DEGREE == pytest.approx(values["slip_deg"])
 
 
-def test_a_ratchet_takes_a_step_each_time_that_the_load_comes_above_a_level(whole):
-    values, run = acting("bolt_ratchet", 0.01)
-    press = np.linalg.norm(whole.force_N, axis=1)
-    moved = np.linalg.norm(run.tip_mm - whole.tip_mm, axis=1) / 0.01
-    rises = np.sum(np.diff((press > values["hold_N"]).astype(int)) > 0)
-    assert 1 <= round(moved[-1]) <= rises
-    assert np.all(np.diff(moved) > -1e-9)
-    np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
-
-
-def test_a_tracker_that_smooths_is_late_by_its_time(plain):
-    _, run = only("tracker_filter", 0.02)
-    busy = slice(2500, 3500)  # in the middle of a row along y
-    speed = run.rates(plain.tip_mm)[busy, 1]
-    np.testing.assert_allclose((plain.tip_mm - run.tip_mm)[busy, 1], 0.02 * speed, atol=0.02)
-    _, hooks = form(LIBRARY["tracker_filter"].others[0], 0.02)
-    average = driven(hooks)
-    np.testing.assert_allclose((plain.tip_mm - average.tip_mm)[busy, 1], 0.02 * speed, atol=0.05)
-
-
 def test_a_reading_in_steps_is_a_ladder_and_one_that_hangs_is_a_play(plain):
     _, run = only("force_steps", 20.0)
     np.testing.assert_allclose(run.sensed_N / 20.0, np.round(run.sensed_N / 20.0), atol=1e-9)
@@ -158,50 +89,6 @@ def test_a_reading_in_steps_is_a_ladder_and_one_that_hangs_is_a_play(plain):
     lacks = plain.sensed_N - run.sensed_N
     full = np.abs(plain.sensed_N).max(axis=0)
     np.testing.assert_allclose(np.abs(lacks).max(axis=0), 0.025 * full, rtol=1e-6)  # half of the loop's width
-
-
-def test_the_floor_shakes_with_one_tone_along_one_axis(plain):
-    values, run = only("floor_vibration", 0.1, "y")
-    moved = run.tip_mm - plain.tip_mm
-    along = moved[:, 1]
-    assert np.abs(moved[:, [0, 2]]).max() == 0.0
-    later = driven(form(LIBRARY["floor_vibration"].same, 0.1, 1, "y")[1], number=1)
-    np.testing.assert_array_equal(later.tip_mm, run.tip_mm)  # both an hour after the first: one clock
-    turn = 2.0 * np.pi * values["hz"] * (3600.0 + run.t_s) + values["phase"]
-    np.testing.assert_allclose(along, 0.1 * np.sin(turn), atol=1e-9)
-    power = np.abs(np.fft.rfft(along * np.hanning(len(along))))
-    peak = np.fft.rfftfreq(len(along), STEP_s)[int(np.argmax(power))]
-    assert peak == pytest.approx(values["hz"], abs=0.2)
-    assert np.abs(along).max() == pytest.approx(0.1, rel=1e-3)
-
-
-def test_an_axis_whose_bearing_wobbles_tilts_all_that_it_carries(plain):
-    values, run = only("bearing_wobble", 0.1, "A1")
-    moved = (run.tip_mm - plain.tip_mm)[::SLOW]
-    place = to_root(WORLD, plain.tip_mm)[::SLOW]
-    turn = values["per_turn"] * plain.q_act[::SLOW, 0] + values["phase"]
-    axis = np.array([0.0, 0.0, -1.0])  # A1 turns about the root's z, downwards
-    line = np.cos(turn)[:, None] * [1.0, 0.0, 0.0] + np.sin(turn)[:, None] * np.cross(axis, [1.0, 0.0, 0.0])
-    np.testing.assert_allclose(moved, 1e-4 * np.cross(line, place), atol=1e-9)
-
-
-def test_a_spindle_that_droops_costs_the_chips_force_and_not_the_edges(plain):
-    _, run = only("spindle_droop", 5.0)
-
-    def edges_alone(run: Run) -> None:
-        k = run.world.cutter.coefficients
-        run.world = run.world.cutting(coefficients=np.append(np.zeros(3), k[3:]))
-
-    chip = plain.force_N - driven({"world": edges_alone}).force_N
-    thicker = 1.0 / (1.0 - 0.05 * plain.cut.moment_Nmm[:, 2] / 1000.0) - 1.0
-    more, cutting = run.force_N - plain.force_N, np.linalg.norm(plain.force_N, axis=1) > 30.0
-    np.testing.assert_allclose(more, thicker[:, None] * chip, atol=1e-9)
-    assert np.linalg.norm(more, axis=1).max() > 1.0
-    values, hooks = form(LIBRARY["spindle_droop"].others[0], 5.0)
-    late = driven(hooks).force_N - plain.force_N
-    first = np.flatnonzero(cutting)[0]
-    assert np.linalg.norm(late[first]) < 0.5 * np.linalg.norm(more[first])
-    assert 0.02 <= values["tau_s"] <= 0.2
 
 
 # of no library ----------------------------------------------------------------------------------------------
