@@ -140,7 +140,12 @@ def test_bounded_work(template):
 
 
 @pytest.mark.parametrize("template", KRL)
-def test_a_template_neither_moves_nor_jumps_nor_changes_settings(tmp_path, template):
+def test_a_template_neither_moves_nor_jumps_nor_changes_settings(template):
+    assert problem(render(template, {"rpm": 1.0}))
+
+
+@pytest.mark.parametrize("template", ["LIN_REL {Z 5}", "$OUT[5]=TRUE{{ '\x0b' }}$BASE=$NULLFRAME", "é"])
+def test_nothing_is_written_with_a_template_that_moves_or_sets(tmp_path, template):
     cell = load_cell(cell_with(tmp_path, template))
     with pytest.raises(RefusedError, match=r"m_code\.M8 of the cell") as error:
         Made(
