@@ -4,7 +4,7 @@ The defaults are stated, plausible values; none was fitted to a figure. The last
 filters and delays together and prints the range beside the defaults' figures; `--plot FILE` draws the first.
 
     python benchmarks/twin_sensitivity.py                 the test piece, about two minutes
-    python benchmarks/twin_sensitivity.py --small         a third of the parameters at one end, two combinations
+    python benchmarks/twin_sensitivity.py --small         every third parameter at one end, two combinations
     python benchmarks/twin_sensitivity.py --only depths   over the depth of the grooves, which nobody states
     python benchmarks/twin_sensitivity.py --only play     section 3.3, over what is not known of the drives
 """
