@@ -80,7 +80,7 @@ def translated(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(20)))]
+    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(8)))]
 )
 def test_random_arcs_go_where_the_g_code_goes(translated, seed):
     text, arcs = random_arcs(np.random.default_rng(seed))

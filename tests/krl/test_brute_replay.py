@@ -119,7 +119,7 @@ class Case:
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 8 + draws(40)))]
+    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 8 + draws(12)))]
 )
 def test_leads_of_generated_programs(tmp_path, seed):
     """Several cells, both forms, with steps of the force and without."""

@@ -94,7 +94,7 @@ def test_without_the_word_nothing_changes(translated):
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(20)))]
+    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(8)))]
 )
 def test_random_programs_are_read_back_and_stay_near_their_chords(seed, translated):
     """Between the points: the cubic spline, and the one of Akima that bends where its points do."""
