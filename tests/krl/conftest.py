@@ -1,11 +1,12 @@
 """A small part with everything that becomes KRL: two tools, spindle, coolant, dwell, blending."""
 
 import io
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from gcode2krl import set_targets, write_krl
+from gcode2krl import set_targets, verify_krl, write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
 
@@ -65,6 +66,10 @@ class Made:
     @property
     def lines(self) -> list[str]:
         return self.src.read_bytes().decode("utf-8").split("\n")[:-1]
+
+
+verified = partial(verify_krl, forces=False)
+"""The text read back and compared; what is judged with forces is tried in tests/cli/test_verify_hazards.py."""
 
 
 def read(text: str, cell, name: str = "part.nc"):

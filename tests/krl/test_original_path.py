@@ -256,7 +256,7 @@ def written(tmp_path):
 
 
 def verified(part, program, **options):
-    return verify_krl(program.files[0], read_gcode(part, CELL), CELL, **options)
+    return verify_krl(program.files[0], read_gcode(part, CELL), CELL, forces=False, **options)
 
 
 def test_a_written_program_agrees_with_the_original(written):

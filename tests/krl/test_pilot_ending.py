@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from gcode2krl import verify_krl, write_krl
+from gcode2krl import write_krl
 from gcode2krl.cell import load_cell, resolve_cell
 from gcode2krl.errors import RefusedError
 from gcode2krl.krl import pilot_plan
 from gcode2krl.online.pilot_gate import Announced, Gate, estimate, gate_start, pilot_table
 from gcode2krl.pilot import force_at, read_pilot
 from tests.krl.brute_replay import Law, replay
-from tests.krl.conftest import read
+from tests.krl.conftest import read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.replay import read_program
 
@@ -111,7 +111,7 @@ def test_the_receiver_follows_and_then_knows_no_force(ended):
 def test_verify_reads_the_end(ended, tmp_path):
     prediction, program, knots, _, _ = ended
     src = tmp_path / "part.src"
-    report = verify_krl(src, prediction.toolpath, prediction.cell, prediction=prediction)
+    report = verified(src, prediction.toolpath, prediction.cell, prediction=prediction)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.knots == len(knots) == program.pilot.knots
     assert report.pilot.max_error_N <= program.pilot.max_error_N + 1e-6
@@ -120,7 +120,7 @@ def test_verify_reads_the_end(ended, tmp_path):
     delay = int(lines[end].split(b"DELAY=")[1].split()[0])
     lines[end] = lines[end].replace(b"DELAY=%d " % delay, b"DELAY=%d " % (delay + 100))
     src.write_bytes(b"\r\n".join(lines))
-    report = verify_krl(src, prediction.toolpath, prediction.cell, prediction=prediction)
+    report = verified(src, prediction.toolpath, prediction.cell, prediction=prediction)
     assert "end of the pilot force: its end is told too late" in {issue.message for issue in report.issues}
 
 
@@ -180,6 +180,6 @@ def test_triggers_behind_a_wait_are_not_read_before_it(tmp_path, dwell):
     assert "pilot-tolerance" not in {issue.code for issue in program.issues}
     assert (read_pilot(tmp_path / "part.pilot.csv")[0].lead_s < 0.1).all()  # nor was one told early
     assert program.pilot.max_active <= 8
-    report = verify_krl(tmp_path / "part.src", prediction.toolpath, cell)
+    report = verified(tmp_path / "part.src", prediction.toolpath, cell)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.max_active == program.pilot.max_active

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gcode2krl import load_cell, plan_motion, read_gcode, verify_krl, write_krl
+from gcode2krl import load_cell, plan_motion, read_gcode, write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import RefusedError
 from gcode2krl.pilot import force_at, read_pilot
 from tests.conftest import EXAMPLES as ALL_EXAMPLES
 from tests.conftest import draws
-from tests.krl.conftest import read
+from tests.krl.conftest import read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.pilot_replay import breaks_of_blending, fire, halts_of, most_waiting
 from tests.krl.replay import read_program
@@ -84,7 +84,7 @@ def check(made, in_view=IN_VIEW):
     assert off.max() <= pilot.max_error_N + 1e-6
     assert pilot.max_error_N <= pilot.tolerance_N or "pilot-cycle" in made.codes
     assert pilot.rms_error_N <= pilot.max_error_N + 1e-9
-    report = verify_krl(made.src, made.prediction.toolpath, made.cell, prediction=made.prediction)
+    report = verified(made.src, made.prediction.toolpath, made.cell, prediction=made.prediction)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.knots == pilot.knots
     assert report.pilot.max_active == pilot.max_active
