@@ -69,7 +69,7 @@ class Made:
 
 
 verified = partial(verify_krl, forces=False)
-"""The text read back and compared; what is judged with forces is tried in tests/cli/test_verify_hazards.py."""
+"""The text is read back and compared; hazards with forces have tests/cli/test_verify_hazards.py."""
 
 
 def read(text: str, cell, name: str = "part.nc"):
