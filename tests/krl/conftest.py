@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gcode2krl import set_targets, verify_krl, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
+from tests.cells import over_demonstration
 
 PART = """G21 G90 G17 G40 G49 G80 G94
 G54 G64 P0.02
@@ -56,7 +56,7 @@ class Made:
     ):
         self.part = folder / f"{stem}.nc"
         self.part.write_text(text)
-        self.cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+        self.cell = over_demonstration(data)
         self.toolpath = read(text, self.cell, self.part.name if into_folder else "part.nc")
         self.targets = set_targets(self.toolpath, self.cell)
         output = folder if into_folder else folder / f"{stem}.src"

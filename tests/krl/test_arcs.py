@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, predict, set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl.read import read_texts
 from gcode2krl.translation import Order, carry_out
+from tests.cells import over_demonstration
 from tests.conftest import draws
 from tests.krl.conftest import verified
 
@@ -24,7 +24,7 @@ LINE = re.compile(r"(LIN|CIRC) (?:\{X (\S+),Y (\S+),Z (\S+)\},)?\{X (\S+),Y (\S+
 
 def cell_with_arcs(**more):
     controller = {"circ": True, **more.pop("controller", {})}
-    return resolve_cell({"based_on": "demonstration", "controller": controller, **more})
+    return over_demonstration({"controller": controller, **more})
 
 
 def random_arcs(rng, count=8):

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from gcode2krl import set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl import composition, read_krl
+from tests.cells import over_demonstration
 from tests.conftest import HEEDS_CTRL_C, ROOT
 from tests.krl.conftest import verified
 
@@ -79,7 +79,7 @@ def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request
 @pytest.fixture
 def targets(tmp_path):
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
-    cell = resolve_cell({"based_on": "demonstration", "program": {"max_lines": 250}})
+    cell = over_demonstration({"program": {"max_lines": 250}})
     toolpath = read_gcode(tmp_path / "part.nc", cell)
     return toolpath, set_targets(toolpath, cell), cell
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import Prediction, set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl import windows
 from gcode2krl.pilot import read_pilot
+from tests.cells import over_demonstration
 from tests.krl.conftest import PART, read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.replay import read_program
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 def part(data=None, text=PART, dt_s=0.012):
     """Predict the part of the other tests, with forces and a deflection."""
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     prediction = moved(read(text, cell), cell, dt_s)
     force = cutting_below(prediction, force_N=300.0)
     return with_forces(prediction, force, force / 400.0)
@@ -175,7 +175,7 @@ def test_a_motion_of_other_targets_is_refused(tmp_path):
 
 def test_a_position_alone(tmp_path):
     """A program without any move that could carry a trigger."""
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     prediction = moved(read("G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z50\nM30\n", cell), cell)
     forced = with_forces(prediction, np.zeros((len(prediction.motion), 3)))
     assert write_krl(forced, tmp_path / "part.src").pilot.knots == 0

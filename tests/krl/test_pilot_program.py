@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, plan_motion, read_gcode, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import RefusedError
 from gcode2krl.pilot import force_at, read_pilot
+from tests.cells import over_demonstration
 from tests.conftest import EXAMPLES as ALL_EXAMPLES
 from tests.conftest import draws
 from tests.krl.conftest import read, verified
@@ -30,7 +30,7 @@ the next."""
 
 def predicted(body, data=None):
     """Predict a part that begins above the work at (0, 0, 2)."""
-    cell = resolve_cell({"based_on": "demonstration", **data}) if data else load_cell()
+    cell = over_demonstration(data) if data else load_cell()
     return moved(read(HEAD + body + FOOT, cell), cell)
 
 

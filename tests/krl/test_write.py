@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl.number_text import fixed, motion_lines
-from tests.cells import OWN_CELL, signed
+from tests.cells import OWN_CELL, over_demonstration, signed
 from tests.krl.conftest import PART, read, verified
 from tests.krl.replay import components, frame
 
@@ -511,7 +510,7 @@ def test_motion_lines_use_the_same_rule(rows, speed, cdis):
 
 
 def test_feed_is_exact_to_a_tenth_of_a_millimetre_a_minute(tmp_path):
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     for feed in (0.1, 7.3, 1234.5, 5999.9):
         toolpath = read(PART.replace("F1500", f"F{feed}"), cell)
         written = write_krl(set_targets(toolpath, cell), None, cell)
