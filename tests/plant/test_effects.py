@@ -9,7 +9,7 @@ from tests.plant import instruments, truth
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN, Draw
 from tests.plant.robot import Run, fast, joints_for
 from tests.plant.scene import World
-from tests.plant.short import driven
+from tests.plant.waypoints import PROGRAMS, Waypoints
 
 WORLD = World()
 ALL = {**LIBRARY, **SLIPS, **{f"open:{name}": kind for name, kind in UNKNOWN.items()}}
@@ -41,6 +41,19 @@ LATE = (
 FAR = dict.fromkeys(
     ("encoder_drop_out", "collision", "bolt_ratchet", "cable_jerks_free", "preload_jump"), "slots"
 )  # not to be seen on two rows
+
+
+def two_rows() -> Waypoints:
+    """The start of a program: dive, a row along y, a step, the row back."""
+    way = PROGRAMS["zigzag"]().waypoints()
+    cdis = way.cdis_mm[:7].copy()
+    cdis[-1] = 0.0
+    return Waypoints(way.position_mm[:7], way.speed_mm_s[:7], cdis, way.hold_s[:7], way.cutting[:7])
+
+
+def driven(hooks: dict, number: int = 0, program: str | None = None) -> Run:
+    way = two_rows() if program is None else PROGRAMS[program]().waypoints()
+    return simulate(way, WORLD, [hooks], age_s=3600.0, number=number)
 
 
 def middle(kind) -> float:
