@@ -7,7 +7,7 @@ import pytest
 
 from tests.plant import instruments, truth
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN, Draw
-from tests.plant.robot import Run, fast, joints_for
+from tests.plant.robot import Run, fast, joints_for, simulate
 from tests.plant.scene import World
 from tests.plant.waypoints import PROGRAMS, Waypoints
 
