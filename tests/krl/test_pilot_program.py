@@ -402,9 +402,8 @@ def random_forces(prediction, chance):
 
 
 @pytest.mark.slow
-def test_many_programs(tmp_path, monkeypatch):
+def test_many_programs(tmp_path):
     """Some are carried out by the replay; few are refused, for knots that are too close."""
-    monkeypatch.setattr("os.fsync", lambda descriptor: None)
     chance = np.random.default_rng(20)
     written, refused, pieces, knots = 0, [], 0, 0
     count = draws(15)
