@@ -167,11 +167,10 @@ def nth(method, n):
     return counted
 
 
-@pytest.mark.parametrize("call", [1, 2])
 @pytest.mark.parametrize(
     "victim", [(os, "fsync"), (Path, "replace"), (os, "fdopen"), (Path, "chmod")], ids=lambda v: v[1]
 )
-@pytest.mark.parametrize("split", ["defs", "files"])
+@pytest.mark.parametrize(("call", "split"), [(1, "defs"), (2, "files")])
 def test_full_disk_leaves_the_old_files(make, tmp_path, monkeypatch, victim, call, split):
     """All old or all new, whichever write the disk refuses."""
     data = {"program": {"max_lines": 100}}
