@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gcode2krl.cell import Cell
-    from gcode2krl.identify.controller import CornerFit, Estimate, Identification, Section
+    from gcode2krl.identify.controller import CornerFit, Identification, Section
+    from gcode2krl.identify.estimate import Estimate
     from gcode2krl.runs import ControllerTrace
 
 _MOST_SHOWN = 20
