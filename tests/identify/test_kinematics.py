@@ -142,6 +142,7 @@ def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
     assert found.noise_from == "poses visited again"
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_nine_times_in_ten():
     """Slow drift of the figure would be seen by benchmarks/identify_kinematics.py, which draws more."""
     inside = []
@@ -153,6 +154,7 @@ def test_intervals_hold_the_truth_nine_times_in_ten():
     assert 0.8 < np.mean(inside) < 0.98
 
 
+@pytest.mark.slow
 def test_error_curves_of_joints_are_told_where_they_are():
     arm = pose_arms.clean(pose_arms.KR300, 3)
     columns = pose_arms.measured(arm, 900, 7).columns()
