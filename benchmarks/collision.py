@@ -4,7 +4,7 @@
 triangles, with the fixture near the way and far from it; then 10,000 random capsules against a mesh of 3,168
 triangles by python-fcl and by us, and 1,000 plates of 2 mm that a body passes between two rows; then the
 default command on a raster of a million lines, without and with such a fixture 8 mm beside the cutter.
-``--small`` takes a twentieth of all of it.
+``--small`` takes a hundredth of all of it.
 """
 
 import argparse
@@ -210,9 +210,9 @@ def frame_along(way: np.ndarray, origin: np.ndarray) -> np.ndarray:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the figures."""
     parser = argparse.ArgumentParser(description="cost and agreement of the collision check")
-    parser.add_argument("--small", action="store_true", help="a twentieth of it")
+    parser.add_argument("--small", action="store_true", help="a hundredth of it")
     options = parser.parse_args(arguments)
-    share = 20 if options.small else 1
+    share = 100 if options.small else 1
     q_rad = raster(1_000_000 // share)
     for beside_mm in (8.0, 40.0, 200.0):
         print(cost(q_rad, beside_mm), flush=True)

@@ -462,10 +462,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the figures."""
     parser = argparse.ArgumentParser(description="constructed collisions against python-fcl")
     parser.add_argument("--share", type=float, default=1.0, help="of the cases of each kind")
+    parser.add_argument("--only", choices=KINDS)
     options = parser.parse_args(arguments)
     for is_clean in (False, True):
         right = total = 0
         for kind, whole in KINDS.items():
+            if options.only not in (None, kind):
+                continue
             count = max(1, round(options.share * whole))
             wrong = [words for _, words in cases(kind, count, is_clean) if words]
             right, total = right + count - len(wrong), total + count

@@ -131,8 +131,11 @@ def profile(shape):
     return np.array(r), np.array(z)
 
 
-def exact_volume(case):
-    """Return the volume (mm³) that hulls of the cutter at two samples each take from the block."""
+def exact_volume(case, every=1):
+    """Return the volume (mm³) that hulls of the cutter at two samples each take from the block.
+
+    ``every``: so many samples of one straight way on which the axis turns evenly are one step.
+    """
     import manifold3d
 
     r, z = profile(shape_of(case.tool))
@@ -144,7 +147,7 @@ def exact_volume(case):
     # one hull covers a straight way of a constant axis
     bends = np.abs(np.diff(way, axis=0)).max(axis=1) > 1e-9
     bends |= np.abs(way[1:, 3:]).max(axis=1) > 0.0
-    rows = [0, *(np.flatnonzero(bends) + 1), len(case.tip) - 1]
+    rows = [0, *(np.flatnonzero(bends)[every - 1 :: every] + 1), len(case.tip) - 1]
     bodies = [cutter.transform(np.column_stack([frame(case.axis[row]), case.tip[row]])) for row in rows]
     sweeps = [manifold3d.Manifold.batch_hull([a, b]) for a, b in itertools.pairwise(bodies)]
     for first in range(0, len(sweeps), 16):

@@ -1,5 +1,7 @@
 """Cells for tests: one that states everything itself, and partial cells over the demonstration."""
 
+import json
+from functools import cache
 from pathlib import Path
 
 from gcode2krl.cell import Cell, confirmation, library, resolve_cell
@@ -11,8 +13,13 @@ OWN_CELL = {key: value for key, value in _DEMONSTRATION.items() if key != "model
 
 
 def over_demonstration(data: dict | None = None) -> Cell:
-    """Return the demonstration cell with some keys of its own."""
-    return resolve_cell({"based_on": "demonstration", **(data or {})})
+    """Return the demonstration cell with some keys of its own; what is asked for again is the same object."""
+    return _resolved(json.dumps({"based_on": "demonstration", **(data or {})}))
+
+
+@cache
+def _resolved(text: str) -> Cell:
+    return resolve_cell(json.loads(text))
 
 
 def signed(data: dict, by: str = "A. Person", date: str = "2026-01-31", beside: Path | None = None) -> dict:

@@ -8,7 +8,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.pilot import (
     Knots,
@@ -20,6 +19,7 @@ from gcode2krl.pilot import (
     sidecar_text,
     to_pilot_frame,
 )
+from tests.cells import over_demonstration
 
 CYCLE_S = 0.012
 HEADER = PilotHeader("tcp", "index", "$SEN_PINT[1]", 0.04, 123456)
@@ -205,20 +205,20 @@ def test_forces_are_turned_into_the_tool():
     chance = np.random.default_rng(2)
     turns = Rotation.random(20, random_state=3)
     vectors, tool = chance.normal(0, 100, (20, 3)), np.ones(20, dtype=np.int32)
-    found = to_pilot_frame(vectors, turns.as_quat(), tool, resolve_cell({"based_on": "demonstration"}))
+    found = to_pilot_frame(vectors, turns.as_quat(), tool, over_demonstration())
     assert found == pytest.approx(turns.inv().apply(vectors))
     one = to_pilot_frame(
         vectors,
         np.broadcast_to(turns[4].as_quat(), (20, 4)),
         tool,
-        resolve_cell({"based_on": "demonstration"}),
+        over_demonstration(),
     )
     assert one == pytest.approx(turns[4].inv().apply(vectors))
     base = to_pilot_frame(
         vectors,
         turns.as_quat(),
         tool,
-        resolve_cell({"based_on": "demonstration", "pilot": {"frame": "base"}}),
+        over_demonstration({"pilot": {"frame": "base"}}),
     )
     assert base.tolist() == vectors.tolist()
 
@@ -226,7 +226,7 @@ def test_forces_are_turned_into_the_tool():
 def test_tcp_is_the_tool_as_the_controller_has_it():
     """With x from tip to holder, a force along the inner z is one along x."""
     frame = {"x_mm": 100.0, "y_mm": 0.0, "z_mm": 200.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
-    cell = resolve_cell({"based_on": "demonstration", "tool": {"2": {"axis": "+x", "frame": frame}}})
+    cell = over_demonstration({"tool": {"2": {"axis": "+x", "frame": frame}}})
     rotation = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
     found = to_pilot_frame(np.array([[0, 0, 9.0], [0, 0, 9.0]]), rotation, np.array([1, 2]), cell)
     assert found == pytest.approx(np.array([[0, 0, 9.0], [9.0, 0, 0]]))

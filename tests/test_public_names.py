@@ -105,25 +105,3 @@ def test_an_unknown_name_is_an_attribute_error():
 def test_no_function_has_the_name_of_its_module():
     shared = [dotted for dotted, tree in modules() if dotted.split(".")[-1] in defined(tree)]
     assert shared == sorted(STILL_SHARED)
-
-
-@pytest.mark.slow
-def test_no_package_exports_a_name_that_a_module_of_its_has():
-    """`from package import name` would mean one or the other, by what was imported first."""
-    shared = []
-    for dotted, tree in modules():
-        *package, last = dotted.split(".")
-        if last != "__init__":
-            continue
-        folder = PACKAGE.joinpath(*package)
-        exported = {
-            alias.asname or alias.name
-            for node in tree.body
-            if isinstance(node, ast.ImportFrom)
-            for alias in node.names
-        }
-        siblings = {file.stem for file in folder.glob("*.py")} | {
-            each.name for each in folder.iterdir() if each.is_dir()
-        }
-        shared += [".".join([*package, name]) for name in sorted(exported & siblings)]
-    assert shared == []

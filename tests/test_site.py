@@ -32,12 +32,6 @@ def test_every_document_is_in_the_contents():
     assert len(listed) == len(set(listed))
 
 
-def test_the_contents_load_nothing_from_elsewhere():
-    settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert "font: false" in settings
-    assert "http" not in settings
-
-
 PAGE = '<html><body><h1 id="top">a</h1>{}</body></html>'
 
 
@@ -73,13 +67,6 @@ def test_each_finding_has_a_page_and_the_table_leads_to_it(part):
     assert set(re.findall(r"\(findings/([a-z0-9-]+)\.md\)", table)) == set(all_codes())
 
 
-def test_a_page_says_when_its_finding_may_be_released(part):
-    made = part("finding_pages").pages()
-    assert "--allow spindle-off:LINE" in made["findings/spindle-off.md"]
-    assert all_codes()["arc-no-centre"].allow.startswith("never")
-    assert "--allow" not in made["findings/arc-no-centre.md"]
-
-
 def test_documents_and_findings_that_are_named_become_links(part):
     def linked(text, page="a.md"):
         return part("crosslinks").linked(text, page, {"runs"}, {"spindle-off", "allow"})
@@ -93,26 +80,6 @@ def test_documents_and_findings_that_are_named_become_links(part):
     assert linked(block) == block
 
 
-def test_equations_become_mathml(part):
-    pytest.importorskip("markdown", reason="needs the extra docs")
-    equations = part("mathml", "latex2mathml").Equations()
-    import markdown
-
-    text = "An $`a_P`$ and $BASE:\n\n```math\nv^2 \\tag{3}\n```\n\n```text\n$`b`$\n```\n"
-    html = markdown.markdown(text, extensions=[equations, "pymdownx.superfences"])
-    assert html.count("<math ") == 2
-    assert 'id="eq-3"' in html
-    assert "(3)" in html
-    assert "$BASE" in html
-    assert "$`b`$" in html
-
-
-def test_an_equation_with_a_command_that_is_not_known_is_an_error(part):
-    mathml = part("mathml", "latex2mathml")
-    with pytest.raises(ValueError, match="nosuchcommand"):
-        mathml.block(r"\nosuchcommand x")
-
-
 def test_every_equation_of_the_documents_can_be_shown_and_numbers_rise(part):
     mathml = part("mathml", "latex2mathml")
     count = 0
@@ -123,44 +90,3 @@ def test_every_equation_of_the_documents_can_be_shown_and_numbers_rise(part):
         assert all("<math" in mathml.block(text) for text in blocks)
         count += len(blocks)
     assert count > 30
-
-
-DOCSTRING = """One line.
-
-Parameters
-----------
-q_rad : (n, 6)
-    A1 to A6.
-rest, more : what they are,
-    together.
-
-Raises
-------
-ValueError
-    Where.
-"""
-READ = """One line.
-
-Parameters
-----------
-q_rad
-    (n, 6)
-    A1 to A6.
-rest
-    what they are,
-    together.
-more
-    what they are,
-    together.
-
-Raises
-------
-ValueError
-    Where.
-"""
-
-
-def test_docstrings_keep_what_stands_behind_the_colon(part):
-    described = part("described", "griffe").described
-    assert described(DOCSTRING) == READ
-    assert described("Returns\n-------\na_mm : (n,)\n") == "Returns\n-------\na_mm :\n    (n,)\n"

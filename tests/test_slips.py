@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcode2krl import cut, plan_motion
-from gcode2krl.cell import load_cell, resolve_cell
+from gcode2krl.cell import load_cell
 from gcode2krl.cell.confirmation import future_confirmation
 from gcode2krl.cli.main import _run
 from gcode2krl.cutting.tool_use import plunge_limit_mm
@@ -17,6 +17,7 @@ from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.program import check_toolpath
+from tests.cells import over_demonstration
 
 HEAD = "G21 G90 G17 G54\nT9 M6\nS8000 M3\nG0 X0 Y0\nG43 Z5 H9\n"
 SLOT = "G1 Z-4 F600\nX60\nG0 Z30\nM5\nM30\n"
@@ -31,7 +32,7 @@ SWITCHES = {"M3": "$OUT[1]=TRUE", "M4": "$OUT[2]=TRUE", "M5": "$OUT[1]=FALSE\n$O
 
 
 def cell_with(**more):
-    return resolve_cell({"based_on": "demonstration", "tool": {"9": {**T9, **more.pop("tool", {})}}, **more})
+    return over_demonstration({"tool": {"9": {**T9, **more.pop("tool", {})}}, **more})
 
 
 def refusal(**more):

@@ -1,6 +1,5 @@
 """``gcode2krl identify controller trace.csv``: k, effective CDIS and the law from a recorded trace."""
 
-import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
+from gcode2krl.cli.identified import save_figure, section_in, write_section
 from gcode2krl.cli.inputs import (
     common_options,
     dialect_option,
@@ -18,7 +18,7 @@ from gcode2krl.cli.inputs import (
     require_fit_outputs,
     search_option,
 )
-from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, input_error
+from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError
 from gcode2krl.units import MS_PER_S
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gcode2krl.cell import Cell
-    from gcode2krl.identify.controller import CornerFit, Estimate, Identification, Section
+    from gcode2krl.identify.controller import CornerFit, Identification, Section
+    from gcode2krl.identify.estimate import Estimate
     from gcode2krl.runs import ControllerTrace
 
 _MOST_SHOWN = 20
@@ -275,20 +276,11 @@ def _corner_record(corner: "CornerFit") -> dict[str, Any]:
 
 
 def _apply(result: "Identification", file: Path, trace: str, cell: "Cell") -> Path:
-    """Write k, CDIS and law into a cell file and keep its other keys; comments are lost.
+    """Write k, CDIS and law into a cell file.
 
     CDIS is the value that programs *write*; it goes into the cell only if the corners of the trace were
     programmed with the CDIS of the cell, not with one from ``G64 P``.
     """
-    import tomli_w
-
-    from gcode2krl.cell import library, resolve_cell
-    from gcode2krl.files import write_together
-
-    data = library.read_toml(file) if file.exists() else {}
-    section = data.get("controller", {})
-    if not isinstance(section, dict):
-        raise input_error("cell-key", "controller: found no table", "write [controller]", source=str(file))
     values: dict[str, Any] = {"k_s": round(result.k_best_s, 5)}
     if result.cdis_mm is not None and _is_own_cdis(result, cell):
         values["cdis_mm"] = round(result.cdis_mm.value, 4)
@@ -302,10 +294,7 @@ def _apply(result: "Identification", file: Path, trace: str, cell: "Cell") -> Pa
         f"{result.k_s.low:.5f} to {result.k_s.high:.5f}, residuals {result.rms_mm:.4f} mm rms"
     )
     values["sure"] = "checked"
-    data = {**data, "controller": {**section, **values}}
-    resolve_cell(data, folder=file.parent, source=str(file))
-    write_together({file: tomli_w.dumps(data).encode("utf-8")})
-    return file
+    return write_section(file, "controller", {**section_in(file, "controller"), **values})
 
 
 def _is_own_cdis(result: "Identification", cell: "Cell") -> bool:
@@ -317,15 +306,10 @@ def _is_own_cdis(result: "Identification", cell: "Cell") -> bool:
 
 
 def _save_figure(result: "Identification", file: Path) -> Path:
-    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import look
 
-    kind = file.suffix.lower().removeprefix(".")
-    picture = io.BytesIO()
     with look():
-        figure(result).savefig(picture, format=kind, dpi=130)
-    write_together({file: picture.getvalue()})
-    return file
+        return save_figure(figure(result), file)
 
 
 def figure(result: "Identification") -> "Figure":

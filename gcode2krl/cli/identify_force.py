@@ -1,6 +1,5 @@
 """``gcode2krl identify force run/``: cutting-force coefficients from a measured run."""
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
+from gcode2krl.cli.identified import save_figure, write_section
 from gcode2krl.cli.inputs import VERBOSE, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.units import MS_PER_S
@@ -160,17 +160,12 @@ def _record(fit: "ForceFit") -> dict[str, Any]:
 
 
 def _apply(fit: "ForceFit", ranges: dict[str, list[float]], file: Path, run: "Run", cell: "Cell") -> Path:
-    """Write the coefficients as ``[material]`` into a cell file, keep its other keys; comments are lost."""
-    import tomli_w
-
-    from gcode2krl.cell import library, resolve_cell
+    """Write the coefficients as ``[material]`` into a cell file."""
     from gcode2krl.cell.sections.machining import WIDEST_BAND
-    from gcode2krl.files import write_together
     from gcode2krl.identify.force import NAMES
 
-    data = library.read_toml(file) if file.exists() else {}
     material = cell.material
-    data["material"] = {
+    section = {
         "name": material.name if material is not None else "",
         "linear_edge": {name: round(float(value), 3) for name, value in zip(NAMES, fit.value, strict=True)},
         "relative_band": min(WIDEST_BAND, round(fit.relative_band, 4)),
@@ -178,18 +173,14 @@ def _apply(fit: "ForceFit", ranges: dict[str, list[float]], file: Path, run: "Ru
         "source": f"identified from {run.name}: {fit.samples} samples in cut, residual {fit.rms_N:.1f} N rms",
         "sure": "checked",
     }
-    resolve_cell(data, folder=file.parent, source=str(file))
-    write_together({file: tomli_w.dumps(data).encode("utf-8")})
-    return file
+    return write_section(file, "material", section)
 
 
 def _save_figure(fit: "ForceFit", file: Path) -> Path:
     from matplotlib.figure import Figure
 
-    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import BLUE, GREY, VERMILION, look, thin
 
-    picture = io.BytesIO()
     with look():
         figure = Figure(figsize=(11.0, 7.0), layout="constrained")
         for axis, axes in enumerate(figure.subplots(3, 1, sharex=True)):
@@ -202,6 +193,4 @@ def _save_figure(fit: "ForceFit", file: Path) -> Path:
         handles, names = axes.get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=3)
         figure.suptitle("Measured force and the fitted law")
-        figure.savefig(picture, format=file.suffix.lower().removeprefix("."), dpi=130)
-    write_together({file: picture.getvalue()})
-    return file
+        return save_figure(figure, file)

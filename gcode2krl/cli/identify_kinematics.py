@@ -1,6 +1,5 @@
 """``gcode2krl identify kinematics``: frames, zeros, lengths and axes of an arm from measured poses."""
 
-import io
 import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
+from gcode2krl.cli.identified import gravity_option, save_figure
 from gcode2krl.cli.inputs import cell_files, common_options, named_values, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError, input_error
 
@@ -45,15 +45,7 @@ _GROUPS = "zeros, lengths, axes, wrist, weight, play, gears, drift, air"
     "--no-order", is_flag=True, help="The rows are not in the order in which the poses were driven."
 )
 @click.option("--masses", is_flag=True, help="Take the cell's masses: one stiffness a joint, no weights.")
-@click.option(
-    "--gravity",
-    nargs=3,
-    type=float,
-    default=(0.0, 0.0, -1.0),
-    show_default=True,
-    metavar="X Y Z",
-    help="Direction of gravity in the robot root.",
-)
+@gravity_option
 @click.option(
     "-o", "--output", metavar="SECTION.toml", help="Write what a cell can hold of it as [[effects]]."
 )
@@ -319,10 +311,8 @@ def _figure(result: "Geometry", file: Path) -> Path:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import BLUE, GREY, VERMILION, look
 
-    picture = io.BytesIO()
     with look():
         figure = Figure(figsize=(10.0, 6.4), layout="constrained")
         top, bottom = figure.subplots(2, 1)
@@ -343,6 +333,4 @@ def _figure(result: "Geometry", file: Path) -> Path:
         bottom.set(xlabel="off by mm", ylabel="points", title="how many")
         bottom.legend(loc="upper right")
         figure.suptitle(f"{result.robot}: {result.rms_before_mm:.3f} -> {result.rms_after_mm:.3f} mm rms")
-        figure.savefig(picture, format=file.suffix.lower().removeprefix("."), dpi=130)
-    write_together({file: picture.getvalue()})
-    return file
+        return save_figure(figure, file)

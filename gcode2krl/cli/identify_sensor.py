@@ -7,6 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
+from gcode2krl.cli.identified import gravity_option
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_other
 from gcode2krl.errors import Gcode2KrlError
 
@@ -21,15 +22,7 @@ if TYPE_CHECKING:
 @click.argument("poses")
 @common_options
 @click.option("-o", "--output", metavar="SENSOR.toml", help="Write the calibration for the online side.")
-@click.option(
-    "--gravity",
-    nargs=3,
-    type=float,
-    default=(0.0, 0.0, -1.0),
-    show_default=True,
-    metavar="X Y Z",
-    help="Direction of gravity in the robot root.",
-)
+@gravity_option
 @click.option(
     "--noise-N",
     "noise_N",

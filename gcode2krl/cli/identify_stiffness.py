@@ -1,6 +1,5 @@
 """``gcode2krl identify stiffness``: stiffness of the virtual joints from measuring cubes, or from pulls."""
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +7,7 @@ import click
 
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
+from gcode2krl.cli.identified import save_figure
 from gcode2krl.cli.inputs import cell_files, common_options, read_cell, require_fit_outputs
 from gcode2krl.errors import Gcode2KrlError, input_error
 from gcode2krl.units import UM_PER_MM
@@ -215,12 +215,7 @@ def _joint_record(fit: "JointFit", cell: "Cell") -> dict[str, Any]:
 
 def _save_figure(result: "StiffnessIdentification", file: Path, cell: "Cell") -> Path:
     from gcode2krl.cli.stiffness_figure import figure
-    from gcode2krl.files import write_together
     from gcode2krl.report.drawing import look
 
-    kind = file.suffix.lower().removeprefix(".")
-    picture = io.BytesIO()
     with look():
-        figure(result, cell).savefig(picture, format=kind, dpi=130)
-    write_together({file: picture.getvalue()})
-    return file
+        return save_figure(figure(result, cell), file)

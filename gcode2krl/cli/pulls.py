@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gcode2krl.cli.console import Console
-from gcode2krl.errors import input_error
+from gcode2krl.cli.identified import section_in, write_section
 from gcode2krl.files import write_together
 from gcode2krl.units import NMM_PER_NM
 
@@ -92,20 +92,14 @@ def record_of(fit: "PullFit") -> dict[str, Any]:
 
 
 def apply(fit: "PullFit", file: Path) -> Path:
-    """Write the arm's virtual joints into a cell file and keep its other keys; comments are lost.
+    """Write the arm's virtual joints into a cell file.
 
     Links, and the joints about other axes than their own, are rigid: what they bend is in A1 to A6.
     """
-    import tomli_w
-
-    from gcode2krl.cell import library, resolve_cell
     from gcode2krl.compliance.estimate import ARM
     from gcode2krl.identify.pulls import AXES
 
-    data = library.read_toml(file) if file.exists() else {}
-    section = data.get("compliance", {})
-    if not isinstance(section, dict) or not isinstance(section.get("virtual_joints", {}), dict):
-        raise input_error("cell-key", "compliance: found no table", "write [compliance]", source=str(file))
+    section = section_in(file, "compliance", "virtual_joints")
     joints = {name: {"k_c": RIGID, "k_b": RIGID, "k_a": RIGID} for name in ARM}
     for axis, k in zip(AXES, fit.k_Nmm_rad, strict=True):
         assert k is not None  # a fit with an axis that is not determined is not applied
@@ -119,7 +113,4 @@ def apply(fit: "PullFit", file: Path) -> Path:
         f"displacement within {fit.band:.0%} ({fit.level:.0%}); what links bend is in them",
         "robot_sure": "checked",
     }
-    data = {**data, "compliance": section}
-    resolve_cell(data, folder=file.parent, source=str(file))
-    write_together({file: tomli_w.dumps(data).encode("utf-8")})
-    return file
+    return write_section(file, "compliance", section)

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from gcode2krl.cell import Cell, library, resolve_cell
+from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
-from gcode2krl.errors import input_error
-from gcode2krl.files import write_together
+from gcode2krl.cli.identified import section_in, write_section
 from gcode2krl.identify.stiffness import KEYS, JointFit, StiffnessIdentification
 
 _OF_END_EFFECTOR = ("sensor", "spindle")
@@ -15,27 +14,14 @@ _OTHERS = "; others: "
 
 
 def apply(result: StiffnessIdentification, file: Path, cell: Cell) -> Path:
-    """Write the virtual joints into a cell file and keep its other keys; comments are lost.
+    """Write the virtual joints into a cell file.
 
     A stiffness stated as known is written with the one split from it: only their sum was measured.
-
-    Raises
-    ------
-    NotUnderstoodError
-        The file is not a cell file, or cannot be written.
     """
-    import tomli_w
-
-    data = library.read_toml(file) if file.exists() else {}
-    section = data.get("compliance", {})
-    if not isinstance(section, dict) or not isinstance(section.get("virtual_joints", {}), dict):
-        raise input_error("cell-key", "compliance: found no table", "write [compliance]", source=str(file))
+    section = section_in(file, "compliance", "virtual_joints")
     joints = {**section.get("virtual_joints", {}), **dict(_values(result))}
     section = {**section, "virtual_joints": joints, **_robot(result, section, cell)}
-    data = {**data, "compliance": {**section, **_end_effector(result, section, cell)}}
-    resolve_cell(data, folder=file.parent, source=str(file))
-    write_together({file: tomli_w.dumps(data).encode("utf-8")})
-    return file
+    return write_section(file, "compliance", {**section, **_end_effector(result, section, cell)})
 
 
 def _values(result: StiffnessIdentification) -> Iterator[tuple[str, dict[str, float]]]:

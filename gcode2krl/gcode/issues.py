@@ -13,16 +13,17 @@ from gcode2krl.errors import Issue, Severity
 from gcode2krl.gcode import dialect_marks as d
 from gcode2krl.gcode import findings, sentences
 from gcode2krl.gcode.excerpt import column, quote
-from gcode2krl.gcode.offset_issues import zero_issues
-from gcode2krl.gcode.slips import slip
 from gcode2krl.gcode.state import (
     NOTE_CENTRE,
     NOTE_CODE,
     NOTE_HOME,
+    NOTE_LOCAL,
     NOTE_OVERRIDE,
     NOTE_ROTARY,
+    NOTE_SHIFT,
     NOTE_SMALL_ARC,
     NOTE_STATEMENT,
+    NOTE_TABLE,
 )
 from gcode2krl.gcode.vocabulary import G91_1, TENFOLD
 
@@ -31,6 +32,24 @@ _O_LINE = re.compile(rb"\s*/?\s*(?:N[\d.\s]*)?O\s*[<\d#\[]", re.IGNORECASE)
 Record = Any
 """A numpy record; numpy does not type its fields."""
 
+_COMMENT = re.compile(r"\([^()]*\)|;.*")
+_LETTER_O = re.compile(r"[A-MP-Z]\s*[-+]?[\d.]*O[\d.]*")
+_MACRO_STATEMENT = re.compile(r"[A-Z]O[A-Z]|(?:^|\])\s*(?:N\d+\s*)?DO\s*\d")
+"""GOTO, POPEN, DO1: statements of a macro."""
+_EXPONENT = re.compile(r"[\d.]E[-+]?\d")
+_SHIFTS: dict[int, tuple[Severity, str, str]] = {
+    NOTE_LOCAL: ("note", "{code} moves the zero{by}{more}", "nothing to do if the part lies there"),
+    NOTE_SHIFT: (
+        "warning",
+        "G92 moves the zero{by}{more}",
+        "check that the part lies there; a zero of the cell stands in [work_offsets]",
+    ),
+    NOTE_TABLE: (
+        "warning",
+        "G10 sets a work offset of its own, moved{by}{more}",
+        "check that the part lies there; a zero of the cell stands in [work_offsets]",
+    ),
+}
 _UNSET_COUNTS = {d.PROGRAMS_FANUC: "empty, and a word with it is left out", d.PROGRAMS_SINUMERIK: "0"}
 _INCH_DECIMALS = 4
 _INCH_EXTENT_MM = 60.0
@@ -115,7 +134,7 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
         issue = replace(issue, column=column(texts[line], number, a, b, c))
     letter = chr(int(a)) if 0 < a < FIRST_FOREIGN else ""
     may_slip = line in texts and not (number == findings.F.O_WORD and _O_LINE.match(texts[line]))
-    usual = slip(texts[line], issue.code, letter) if may_slip else None
+    usual = _slip(texts[line], issue.code, letter) if may_slip else None
     return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
 
 
@@ -155,7 +174,7 @@ def program_issues(
     """Yield the warnings and notes about a program that is understood."""
     yield from _spirals(state, texts)
     yield from _notes(state, texts)
-    yield from zero_issues(state)
+    yield from _zero_issues(state)
     if state["unset_line"]:
         yield _unset(int(state["unset_line"]), int(state["unset_parameter"]), programs)
     if state["retract_unnamed_line"]:
@@ -267,3 +286,59 @@ def _unit_issue(state: Record, most_decimals: int) -> Issue:
 def _says_inch(head: bytes) -> bool:
     comments = [line.lower() for line in head.splitlines() if line.lstrip()[:1] in (b"(", b";")]
     return any(b"inch" in line and b"mm" not in line for line in comments)
+
+
+def _slip(block: bytes, code: str, letter: str) -> tuple[str, str] | None:
+    """Return sentence and remedy for a finding ``code`` on ``letter`` if its block shows a usual slip."""
+    text = _COMMENT.sub(" ", block.decode("latin-1")).rstrip()
+    capitals = text.upper() if len(text.upper()) == len(text) else text
+    match = _LETTER_O.search(capitals)
+    if code in ("o-word", "no-number") and match and not _MACRO_STATEMENT.search(capitals):
+        word = match[0].replace(" ", "")
+        if code == "o-word" or word[0] == letter:
+            return (
+                f"the letter O stands in the number of {word[0]}",
+                f"write the digit 0: {word.replace('O', '0')}",
+            )
+    if code == "no-number" and re.search(rf"{letter}\s*[-+]?l(?![A-Za-z])", text, re.IGNORECASE):
+        return f"the letter l stands in the number of {letter}", "write the digit 1"
+    if code == "no-number" and re.search(rf"{letter}\s*[-+]\s*[-+]", capitals):
+        return f"two signs stand before the number of {letter}", "write one sign"
+    if code == "unknown-letter" and letter == "E":
+        if _EXPONENT.search(capitals):
+            return "a number with an exponent E", "write it out, as 0.001"
+        return "E is not a word of this dialect", "remove it; E drives the extruder of a 3D printer"
+    return None
+
+
+def _zero_issues(state: Record) -> Iterator[Issue]:
+    """Yield where the program moves its zero, and that a shift is in force at its end."""
+    for which, (severity, sentence, remedy) in _SHIFTS.items():
+        count, line = int(state["note_count"][which]), int(state["note_line"][which])
+        if count:
+            first = 3 * (which - NOTE_LOCAL)
+            by = _by_mm(state["moved_mm"][first : first + 3])
+            more = f"; {count} blocks move it" if count > 1 else ""
+            what = sentence.format(code=_shift_word(state), by=by, more=more)
+            yield Issue(severity, "program-offset", line, what, remedy)
+    if any(state["shift_mm"]):
+        is_trans = _shift_word(state) == "TRANS"
+        what = f"the shift{_by_mm(state['shift_mm'])} is in force at the end"
+        yield Issue(
+            "note",
+            "offset-left",
+            int(state["shift_line"]),
+            what if is_trans else f"{what}; LinuxCNC would keep it",
+            f"write {'TRANS' if is_trans else 'G92.1'} before the end; here the next program begins without",
+        )
+
+
+def _shift_word(state: Record) -> str:
+    """Return what shifts the zero: G52, which is its number in the state, or TRANS of a Sinumerik."""
+    return "G52" if state["note_word"][NOTE_LOCAL] or not state["note_count"][NOTE_LOCAL] else "TRANS"
+
+
+def _by_mm(moved_mm: Any) -> str:
+    """Return a move as `` by X10 Y-5 mm``; without one only the rotation changes."""
+    words = [f"{letter}{value:g}" for letter, value in zip("XYZ", moved_mm.round(4), strict=True) if value]
+    return f" by {' '.join(words)} mm" if words else " by a rotation"

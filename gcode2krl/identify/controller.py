@@ -37,7 +37,7 @@ from gcode2krl.identify.controller_fit import (
     slope_of,
 )
 from gcode2krl.identify.controller_turning import fit_turning
-from gcode2krl.identify.estimate import QUANTILE_90
+from gcode2krl.identify.estimate import QUANTILE_90, Estimate, around
 from gcode2krl.krc4.motion import build_chain
 from gcode2krl.krc4.profile import UNLIMITED
 from gcode2krl.runs import ControllerTrace, check_scale, resolution_mm
@@ -53,19 +53,6 @@ _WIDEST = 0.5
 _FLOOR_MM = 1e-6
 _MISFIT = 3.0
 _MOST_CORNERS = 200
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted value and its 90 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-    def contains(self, value: float) -> bool:
-        """Tell whether a value lies within the interval."""
-        return self.low <= value <= self.high
 
 
 @dataclass(frozen=True)
@@ -235,11 +222,7 @@ def _estimates(fit: Fit, pieces: list[Piece], settings: Settings) -> tuple[Estim
         weight = (residual / np.maximum(1.0 - leverage, 0.1)) ** 2
         covariance = inverse @ (kept.T * weight @ kept) @ inverse
         half[used] = QUANTILE_90 * np.sqrt(np.diag(covariance))
-    return _around(fit.k_s, half[0]), _around(fit.ratio, half[1])
-
-
-def _around(value: float, half: float) -> Estimate:
-    return Estimate(float(value), float(value - half), float(value + half))
+    return around(fit.k_s, half[0]), around(fit.ratio, half[1])
 
 
 def _union(first: Estimate, other: Estimate) -> Estimate:
@@ -332,7 +315,7 @@ def _turning(
         return None, None, None
     values, errors, rms = fitted
     half = QUANTILE_90 * errors
-    vel, acc = (_around(float(values[at]), float(half[at])) for at in (0, 1))
+    vel, acc = (around(float(values[at]), float(half[at])) for at in (0, 1))
     return vel if _determined(vel) else None, acc if _determined(acc) else None, rms
 
 
@@ -430,8 +413,8 @@ def _corner_fit(piece: Piece, fit: Fit, number: int, row: int, settings: Setting
         speed_mm_s=float(min(piece.speed_mm_s[row], piece.speed_mm_s[row + 1])),
         cdis_mm=float(piece.cdis_mm[row]),
         programmed_d_mm=float(piece.blend_mm(piece.cdis_mm)[row]),
-        d_mm=_around(d_fitted, half),
-        error_mm=_around(d_fitted * share, half * share),
+        d_mm=around(d_fitted, half),
+        error_mm=around(d_fitted * share, half * share),
     )
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 import re
+import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +23,6 @@ from gcode2krl.compiled.threads import in_threads
 from gcode2krl.krl import controller_state as cs
 from gcode2krl.krl import statements as st
 from gcode2krl.krl.cell_hashes import hash_lines
-from gcode2krl.krl.collision_words import collision_lines
 from gcode2krl.krl.external_words import external_lines
 from gcode2krl.krl.names import part_name
 from gcode2krl.krl.number_text import NOTHING_BEFORE, fixed, motion_lines
@@ -38,6 +38,8 @@ from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
 
 NEWLINE = b"\r\n"
+_WIDTH = 76
+"""Of comment lines that are wrapped."""
 DECLARATIONS = """DECL KRLMSG_T GK_MSG
 DECL KRLMSGPAR_T GK_PAR[3]
 DECL KRLMSGOPT_T GK_OPT
@@ -510,7 +512,7 @@ class _Composer:
 
     def _collision_lines(self) -> list[str]:
         scope = self.layout.collisions
-        return [] if scope is None else collision_lines(scope, is_corrected=self.rsi is not None)
+        return [] if scope is None else _words_of(scope, is_corrected=self.rsi is not None)
 
     def _foot(self) -> bytes:
         return _text(st.render(self.cell, "program.epilogue")) + _text(w.END)
@@ -580,3 +582,21 @@ def _assumed_words(cell: Cell) -> str:
 
 def _file_name(source: str) -> str:
     return re.split(r"[\\/]", source)[-1]
+
+
+def _words_of(scope: CollisionScope, *, is_corrected: bool) -> list[str]:
+    """Return what was checked for collisions and what not; ``is_corrected``: by an online correction."""
+    unchecked = [*scope.unchecked, *(["the path as it is corrected online"] if is_corrected else [])]
+    return [
+        *_wrapped("COLLISIONS CHECKED, from HOME to HOME: ", scope.movers),
+        *_wrapped("  against: ", scope.obstacles or ("nothing that the cell states",)),
+        *_wrapped("NOT CHECKED for collisions: ", unchecked),
+    ]
+
+
+def _wrapped(head: str, words: Iterable[str]) -> list[str]:
+    text = st.ascii_text(head.rstrip() + " " + "; ".join(words), 2000)
+    indent = "  " if head.startswith("  ") else ""
+    return textwrap.wrap(
+        text, _WIDTH, initial_indent=indent, subsequent_indent=indent + "  ", break_on_hyphens=False
+    )

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from gcode2krl.tables import Toolpath
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Attempt:
-    """The result of `carry_out`; None where a stage did not run."""
+    """What `carry_out` has done, as far as it got; None where a stage did not run."""
 
     order: Order
     error: Gcode2KrlError | None = None

@@ -119,28 +119,12 @@ def restart_name(
 
 if TYPE_CHECKING:
     from gcode2krl.cell import Cell
-    from gcode2krl.chain import Plan
     from gcode2krl.krl import WrittenProgram
     from gcode2krl.prediction import Prediction
     from gcode2krl.prediction.forecast import Forecast
-    from gcode2krl.tables import Toolpath
 
 
 _Stage = TypeVar("_Stage")
-
-
-@dataclass
-class _Known:
-    """What an attempt knows so far, as far as it got."""
-
-    cell: "Cell | None" = None
-    toolpath: "Toolpath | None" = None
-    plan: "Plan | None" = None
-    corner_mm: float | None = None
-    forecast: "Forecast | None" = None
-    written: "WrittenProgram | None" = None
-    page: Path | None = None
-    standard: StandardInput | None = None
 
 
 @dataclass(frozen=True)
@@ -164,47 +148,43 @@ def carry_out(order: Order, begin: Begin = unseen) -> Attempt:
     ``begin`` is told the name of each stage as it begins. No `Gcode2KrlError` leaves: it is the attempt's
     ``error``, beside what was known when it came. Nothing is printed.
     """
-    known, error = _Known(), None
-    try:
-        _translate(order, known, begin)
-    except Gcode2KrlError as refused:
-        error = _with_page(order, refused, known)
-    return Attempt(order, error, **vars(known))
-
-
-def _translate(order: Order, known: _Known, begin: Begin) -> None:
-    """Run the stages in their order; each leaves in ``known`` what it has found."""
     from gcode2krl.files import watched
 
-    ready = _ready(order, known)
-    with watched(ready.outputs):
-        _carry_on(order, ready, known, begin)
+    attempt = Attempt(order)
+    try:
+        ready = _ready(attempt)
+        with watched(ready.outputs):
+            _carry_on(attempt, ready, begin)
+    except Gcode2KrlError as refused:
+        attempt.error = _with_page(attempt, refused)
+    return attempt
 
 
-def _carry_on(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
-    """Run the stages behind what an order names."""
-    _read(order, ready, known, begin)
+def _carry_on(attempt: Attempt, ready: _Ready, begin: Begin) -> None:
+    """Run the stages behind what an order names; each leaves what it finds in the attempt."""
+    order = attempt.order
+    _read(attempt, ready, begin)
     begin("planning")
-    _plan(order, ready.cell, known)
-    prediction = _predict(order, ready, known, begin)
+    _plan(attempt, ready.cell)
+    prediction = _predict(attempt, ready, begin)
     begin("writing and reading back")
-    written = _write(order, ready, known, _done(known.forecast))
-    known.written = written
+    attempt.written = _write(attempt, ready, _done(attempt.forecast))
     if prediction is not None and order.report is not None:
         page = Path(order.report)
-        write_page_of_written(page, str(order.part), prediction, written.issues, ready.inputs)
-        known.page = page
+        write_page_of_written(page, str(order.part), prediction, attempt.written.issues, ready.inputs)
+        attempt.page = page
 
 
-def _ready(order: Order, known: _Known) -> _Ready:
+def _ready(attempt: Attempt) -> _Ready:
     """Return the order with its cell and names; raises where it cannot be carried out."""
+    order = attempt.order
     part, output = str(order.part), None if order.output is None else str(order.output)
     require_part(part)
     place = place_of(order)
     refuse_online(order, place)
     refuse_without_forces(order.from_line, order.no_forces)
-    known.cell, of_job = read_cell_under_job(order.cell_path, order.job_path, order.tools_path)
-    cell = _with_options(known.cell, order)
+    attempt.cell, of_job = read_cell_under_job(order.cell_path, order.job_path, order.tools_path)
+    cell = _with_options(attempt.cell, order)
     name = restart_name(part, order.name, output, order.from_line, cell)
     inputs = existing(part, *cell_files(order.cell_path), *files_of_job(order.job_path, order.tools_path))
     require_figure(order.compensate_plot)
@@ -214,9 +194,10 @@ def _ready(order: Order, known: _Known) -> _Ready:
     return _Ready(cell, place, name, inputs, outputs, of_job)
 
 
-def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
+def _read(attempt: Attempt, ready: _Ready, begin: Begin) -> None:
     """Read the G-code, from a line on where one is named."""
-    known.standard = StandardInput() if str(order.part) == STANDARD else None
+    order = attempt.order
+    attempt.standard = StandardInput() if str(order.part) == STANDARD else None
     toolpath = read_from_line(
         str(order.part),
         ready.cell,
@@ -225,29 +206,31 @@ def _read(order: Order, ready: _Ready, known: _Known, begin: Begin) -> None:
         order.tolerance_mm,
         order.from_line,
         begin,
-        known.standard,
+        attempt.standard,
         order.dialect,
         order.search,
     )
-    known.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job, *order.project.issues))
+    attempt.toolpath = replace(toolpath, issues=(*toolpath.issues, *ready.of_job, *order.project.issues))
 
 
-def _plan(order: Order, cell: "Cell", known: _Known) -> None:
+def _plan(attempt: Attempt, cell: "Cell") -> None:
     """Set the targets, and refuse those that a robot cannot run."""
     from gcode2krl.chain import prepare
 
-    prepared = prepare(_done(known.toolpath), cell, order.tolerance_mm, order.simplify_mm)
-    known.plan, known.corner_mm = prepared.with_corners(order.tolerance_mm)
-    refuse_early(known.plan.targets, cell, order)
+    order = attempt.order
+    prepared = prepare(_done(attempt.toolpath), cell, order.tolerance_mm, order.simplify_mm)
+    attempt.plan, attempt.corner_mm = prepared.with_corners(order.tolerance_mm)
+    refuse_early(attempt.plan.targets, cell, order)
 
 
-def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Prediction | None":
+def _predict(attempt: Attempt, ready: _Ready, begin: Begin) -> "Prediction | None":
     """Foresee motion, forces and deflection; returns whole tables where something needs them."""
     from gcode2krl.chain import Plan, collect, forecast_of, foresee
 
-    plan, forces = _done(known.plan), not order.no_forces
+    order = attempt.order
+    plan, forces = _done(attempt.plan), not order.no_forces
     if order.compensate is None and order.report is None:
-        known.forecast = foresee(plan, forces=forces, begin=begin)
+        attempt.forecast = foresee(plan, forces=forces, begin=begin)
         return None
     prediction = collect(plan, forces=forces, begin=begin)
     if order.compensate == "offline":
@@ -255,22 +238,23 @@ def _predict(order: Order, ready: _Ready, known: _Known, begin: Begin) -> "Predi
 
         begin("compensation")
         prediction = compensated(prediction, order.compensate_plot, ready.inputs)
-        known.plan = Plan.of(plan.toolpath, prediction.targets, ready.cell)
-    known.forecast = forecast_of(prediction)
+        attempt.plan = Plan.of(plan.toolpath, prediction.targets, ready.cell)
+    attempt.forecast = forecast_of(prediction)
     return prediction
 
 
-def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> "WrittenProgram":
+def _write(attempt: Attempt, ready: _Ready, forecast: "Forecast") -> "WrittenProgram":
     """Write the program and read it back."""
     from gcode2krl.krl import suggested_name, write_krl
 
+    order = attempt.order
     name = ready.name
     if ready.place is None and name is None and str(order.part) != STANDARD:
         name = suggested_name(program_stem(order.part), ready.cell.program.externals)
     return write_krl(
         forecast,
         ready.place,
-        joints=_done(known.plan).joints,
+        joints=_done(attempt.plan).joints,
         name=name,
         allow=() if "allow" in order.project.options else order.allow,
         allow_where_found=order.project.options.get("allow", ()),
@@ -284,23 +268,24 @@ def _write(order: Order, ready: _Ready, known: _Known, forecast: "Forecast") -> 
     )
 
 
-def _with_page(order: Order, error: Gcode2KrlError, known: _Known) -> Gcode2KrlError:
+def _with_page(attempt: Attempt, error: Gcode2KrlError) -> Gcode2KrlError:
     """Write the page of a refused program where one is asked for; returns what refuses it."""
+    order = attempt.order
     inputs = existing(str(order.part), *cell_files(order.cell_path))
     if order.report is None or not can_be_written(order.report, inputs):
         return error
     page = Path(order.report)
     try:
         prediction = write_page_of_refused(
-            page, str(order.part), error, known.toolpath, known.cell, inputs, order.simplify_mm
+            page, str(order.part), error, attempt.toolpath, attempt.cell, inputs, order.simplify_mm
         )
     except Gcode2KrlError as unwritable:
         return unwritable
-    known.page = page
-    if prediction is not None and known.forecast is None:
+    attempt.page = page
+    if prediction is not None and attempt.forecast is None:
         from gcode2krl.chain import forecast_of
 
-        known.forecast = forecast_of(prediction)
+        attempt.forecast = forecast_of(prediction)
     return error
 
 

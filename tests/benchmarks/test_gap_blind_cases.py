@@ -1,11 +1,8 @@
 """Seeds of the check, its parts, and the records that it resumes from."""
 
 import json
-import sys
 from collections import Counter
-from functools import partial
 from importlib import import_module
-from types import SimpleNamespace
 
 import pytest
 
@@ -13,7 +10,6 @@ from tests.benchmarks import hand_made
 
 cases = import_module("blind.cases")
 workers = import_module("blind.cases")
-runs = import_module("blind.cases")
 blind = import_module("blind.check")
 
 
@@ -56,24 +52,6 @@ def test_the_whole_check_has_what_was_promised():
     assert other >= 600 / 3
 
 
-def test_a_part_is_the_first_of_each_kind():
-    counts = cases.full_counts()
-    whole, part = cases.plan(1, counts), cases.plan(1, cases.scaled(counts, 0.1))
-    assert set(part) < set(whole)
-    for kind, count in counts.items():
-        first = [case for case in whole if case.kind == kind][: -(-count // 10)]
-        assert [case for case in part if case.kind == kind] == first
-    singles = [case for case in part if case.kind == "single"]
-    assert {case.form for case in singles} == {"same", "other"}
-
-
-@pytest.mark.parametrize("count", [30, 34, 35])
-def test_each_effect_comes_in_both_forms(monkeypatch, count):
-    monkeypatch.setattr(cases, "has_other_form", lambda name: True)
-    forms = {k: {cases._form("", k + count * turn, count) for turn in range(5)} for k in range(count)}
-    assert all(each == {"same", "other"} for each in forms.values())
-
-
 def test_what_the_library_has_is_not_outside_it(monkeypatch):
     monkeypatch.setattr(cases, "UNKNOWN", {"backlash": None, "cable_snag": None})
     asked = {case.effect for case in cases.plan(1, {"open": 4})}
@@ -104,11 +82,6 @@ def test_processes_return_everything_and_stop_in_time():
     assert list(workers.in_processes(abs, asked, 2, 0.0)) == []
 
 
-def test_a_mixed_check_has_as_many_as_asked():
-    assert sum(cases.mixed(200).values()) == 200
-    assert set(cases.mixed(200)) == set(cases.KINDS)
-
-
 def test_a_record_is_kept_for_its_case_and_its_code(tmp_path):
     case = cases.Case(1001, "single", "backlash", "same")
     record = {"case": {"seed": 1001, "kind": "single", "effect": "backlash", "form": "same"}, "code": "a"}
@@ -121,18 +94,6 @@ def test_a_record_is_kept_for_its_case_and_its_code(tmp_path):
     assert [file.name for file in (tmp_path / "results").iterdir()] == ["single-01001.json"]
 
 
-def test_a_cluster_needs_dask(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    options = ["--null", "1", "--resume", str(tmp_path), "--scheduler", "tcp://127.0.0.1:1"]
-    assert blind.main(options) == 2
-    assert "python -m pip install distributed" in capsys.readouterr().err
-
-
-def test_a_worker_with_other_code_is_refused():
-    with pytest.raises(workers.NoClusterError, match="another state"):
-        workers.at_worker(cases.Case(1, "null", "none"), runs.How(code="something else"))
-
-
 def test_reports_take_records_of_any_code(tmp_path, capsys):
     record = hand_made.record(kind="null") | {"code": "old"}
     record["case"] |= {"effect": "none", "form": None}
@@ -143,47 +104,3 @@ def test_reports_take_records_of_any_code(tmp_path, capsys):
     assert "| false alarms, usual noise" in out
     assert blind.main(["--null", "2", "--resume", str(tmp_path), "--only-report", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["exact"]
-
-
-class Cluster:
-    """A scheduler with one worker: this process."""
-
-    def __init__(self, address, timeout):
-        if address.endswith(":1"):
-            raise OSError("nobody there")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        return None
-
-    def map(self, function, items, pure, **given):
-        return [SimpleNamespace(result=partial(function, item, **given), release=list) for item in items]
-
-
-def test_a_cluster_hands_every_record_back(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=Cluster, as_completed=reversed))
-    monkeypatch.setattr(workers, "_own_folder", lambda: (tmp_path, {}))
-    made = []
-
-    def run_case(case, folder, how, places):
-        made.append(case.seed)
-        asked = {"seed": case.seed, "kind": case.kind, "effect": case.effect, "form": case.form}
-        return hand_made.record(kind="null") | {"case": asked, "code": how.code}
-
-    monkeypatch.setattr(workers, "run_case", run_case)
-    options = ["--null", "3", "--resume", str(tmp_path), "--scheduler", "tcp://127.0.0.1:2"]
-    assert blind.main(options) == 0
-    assert "0.000 (<= 0.632, n 3)" in capsys.readouterr().out
-    assert blind.main(options) == 0
-    assert "3 cases, 3 already there" in capsys.readouterr().err
-    assert made == [3, 2, 1]  # in the order in which they are ready, and each once
-    assert blind.main([*options[:-1], "tcp://127.0.0.1:1", "--null", "4"]) == 2
-    assert "no scheduler answers at tcp://127.0.0.1:1: nobody there" in capsys.readouterr().err
-
-
-def test_what_all_axes_have_alike_comes_in_its_one_form():
-    named = [case for case in cases.plan(1, {"single": 200}) if "@all" in case.effect]
-    assert len(named) > 8
-    assert {case.form for case in named} == {"same"}

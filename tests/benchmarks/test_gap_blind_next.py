@@ -5,7 +5,6 @@ from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from tests.benchmarks.hand_made import answer, cause, effect, record
 
@@ -53,15 +52,6 @@ def test_programs_of_the_three_ways(monkeypatch):
     assert skipped is None
 
 
-def test_what_is_skipped_says_why(monkeypatch):
-    none = record([effect()], LEFT_OPEN)
-    monkeypatch.setattr(following, "names", lambda: ())
-    assert following.chosen_program(following.ASKED, none, TRUTH) == (None, following.NONE_ASKED)
-    assert following.chosen_program(following.RANDOM, none, TRUTH) == (None, following.NO_CANNED)
-    law = ("velocity_rule", None)
-    assert following.chosen_program(following.RANDOM, none, law) == (None, following.OWN_LAW)
-
-
 def test_rates_leave_out_what_was_skipped_and_count_it():
     def drive(way, settled, skipped=None):
         return {"way": way, "program": "circle", "settled": settled, "skipped": skipped}
@@ -86,12 +76,6 @@ def test_stored_runs_are_not_driven_again(tmp_path):
     assert following.next_records([made], tmp_path, "a", following.Asked(0)) == []
 
 
-def test_other_programs_are_driven_beside_some():
-    assert [len(following.ways_of(number, 3)) for number in range(5)] == [3, 1, 1, 3, 1]
-    assert following.ways_of(1, 3) == (following.ASKED,)
-    assert following.ways_of(0, 0) == (following.ASKED,)
-
-
 def test_what_no_motion_can_part_may_stay_in_the_set():
     truth = ("mastering", "A6")
     alike = ("tool_frame", None)
@@ -100,18 +84,6 @@ def test_what_no_motion_can_part_may_stay_in_the_set():
     assert not following.is_settled(answer([cause(*alike)]), truth)
     assert not following.is_settled(answer([cause(*truth, alike=[alike, ("base_frame", None)])]), truth)
     assert not following.is_settled(answer([cause(*alike, alike=[truth])]), alike)  # only the one way round
-
-
-def test_what_the_runs_cost_is_told():
-    drive = {"way": following.ASKED, "program": "circle", "settled": True, "skipped": None, "cpu_s": 12.0}
-    told = following.cost([{"drives": [drive, drive | {"settled": False, "cpu_s": 20.0}]}])
-    assert "circle 1/2 (16 s)" in told
-    assert told.startswith("Processor seconds: 32 for 2 runs")
-
-
-def test_a_program_that_make_test_does_not_have(tmp_path):
-    with pytest.raises(canned.NotCannedError, match="somersault"):
-        canned.predicted("somersault", tmp_path / "cell.toml", tmp_path)
 
 
 def begun(*states):

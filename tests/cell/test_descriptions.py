@@ -6,7 +6,6 @@ import tomllib
 from importlib import resources
 from typing import Annotated
 
-import pytest
 from pydantic import TypeAdapter
 
 from docs import make_cell
@@ -37,30 +36,25 @@ def test_nothing_is_described_that_does_not_exist():
             assert any(key in section.model_fields for section in owners), f"{name}.{key}"
 
 
-@pytest.mark.parametrize(("section", "key"), KEYS, ids=lambda part: getattr(part, "__name__", part))
-def test_a_key_has_a_description_and_an_example_that_is_allowed(section, key):
-    known, field = descriptions_of(section)[key], section.model_fields[key]
-    assert len(known.text) > 8
-    assert not known.text.endswith(".")
-    if known.example is None:
-        assert list(sections_in(field.annotation)), "only a table of further keys has no example"
-        return
-    kind = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
-    stated = tomllib.loads(f"value = {toml_value(known.example)}")["value"]
-    TypeAdapter(kind).validate_python(stated)
+def test_a_key_has_a_description_and_an_example_that_is_allowed():
+    for section, key in KEYS:
+        known, field = descriptions_of(section)[key], section.model_fields[key]
+        assert len(known.text) > 8, key
+        assert not known.text.endswith("."), key
+        if known.example is None:
+            assert list(sections_in(field.annotation)), f"{key}: only a table of further keys has no example"
+            continue
+        kind = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+        stated = tomllib.loads(f"value = {toml_value(known.example)}")["value"]
+        TypeAdapter(kind).validate_python(stated)
 
 
-@pytest.mark.parametrize(("section", "key"), KEYS, ids=lambda part: getattr(part, "__name__", part))
-def test_the_unit_is_that_of_the_name(section, key):
-    unit = descriptions_of(section)[key].unit
-    if key in NO_UNITS:
-        assert unit
-        return
-    parts = key.split("_")
-    ends = ["_".join(parts[-count:]) for count in (2, 1) if len(parts) > count]
-    meant = next((UNITS[end] for end in ends if end in UNITS), None)
-    if meant is not None:
-        assert unit == meant
+def test_the_unit_is_that_of_the_name():
+    for section, key in KEYS:
+        parts, unit = key.split("_"), descriptions_of(section)[key].unit
+        ends = ["_".join(parts[-count:]) for count in (2, 1) if len(parts) > count]
+        meant = next((UNITS[end] for end in ends if end in UNITS), unit)
+        assert unit if key in NO_UNITS else unit == meant, key
 
 
 def test_examples_are_usual():

@@ -11,7 +11,7 @@ from gcode2krl.cell.templates import TemplateError, render
 from gcode2krl.errors import Gcode2KrlError, RefusedError
 from gcode2krl.prediction import Prediction
 from tests.cells import over_demonstration
-from tests.krl.conftest import Made
+from tests.krl.conftest import Made, verified
 
 PART = (
     "G21 G90 G54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0\nG0 Z20\nM8\nG1 Z-1 F600\nG1 X20\nG0 Z50\nM9\nM5\nM30\n"
@@ -140,7 +140,12 @@ def test_bounded_work(template):
 
 
 @pytest.mark.parametrize("template", KRL)
-def test_a_template_neither_moves_nor_jumps_nor_changes_settings(tmp_path, template):
+def test_a_template_neither_moves_nor_jumps_nor_changes_settings(template):
+    assert problem(render(template, {"rpm": 1.0}))
+
+
+@pytest.mark.parametrize("template", ["LIN_REL {Z 5}", "$OUT[5]=TRUE{{ '\x0b' }}$BASE=$NULLFRAME", "é"])
+def test_nothing_is_written_with_a_template_that_moves_or_sets(tmp_path, template):
     cell = load_cell(cell_with(tmp_path, template))
     with pytest.raises(RefusedError, match=r"m_code\.M8 of the cell") as error:
         Made(
@@ -179,13 +184,12 @@ def test_a_condition_hides_nothing(tmp_path):
     "line", ["$BASE=$NULLFRAME", "$TOOL=$NULLFRAME", "$ADVANCE=0", "BAS (#BASE,3 )", "GOTO X"]
 )
 def test_verify_sees_a_setting_behind_the_first_motion(tmp_path, line):
-    from gcode2krl import verify_krl
 
     made = Made(tmp_path, PART)
     lines = made.src.read_text("ascii").splitlines()
     at = next(k for k, text in enumerate(lines) if text.startswith("$OUT[3]=TRUE"))
     made.src.write_text("\r\n".join([*lines[: at + 1], line, *lines[at + 1 :]]) + "\r\n", encoding="ascii")
-    issues = verify_krl(made.src, made.toolpath, made.cell).issues
+    issues = verified(made.src, made.toolpath, made.cell).issues
     found = [issue for issue in issues if issue.code == "krl-setting-changed"]
     assert [issue.line for issue in found] == [at + 2]
     assert "m_code" in found[0].remedy

@@ -46,7 +46,6 @@ WELL = (
     ("inspect", "part.nc"),
     ("identify", "stiffness", str(IDENTIFY / "holder.toml")),
     ("identify", "sensor", str(IDENTIFY / "orientations.csv"), "-o", "calibration.toml"),
-    ("identify", "kinematics", str(IDENTIFY / "poses.csv"), "-o", "geometry.toml"),
     ("runs", "import", "log.csv", "-o", "run-9"),
     ("tools", "import", "tool.tbl", "--unit", "mm", "--cell", "cell.toml"),
     ("online", "simulate", "slot.nc", "--cell", "cell.toml"),
@@ -129,7 +128,7 @@ def name_of(words):
 
 
 def test_the_lists_of_this_file_name_every_command_with_json():
-    slow = {"diagnose", "identify controller", "identify force"}  # tests/gap and tests/identify run them well
+    slow = {"diagnose", "identify controller", "identify force", "identify kinematics"}  # run in their rooms
     assert sorted({name_of(words) for words in WELL} | slow) == ALL
     assert sorted({name_of(words) for words in REFUSED} | {"models list", "cache show"}) == ALL
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import predict
-from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting.engagement import engage
 from gcode2krl.cutting.law import linear_edge_law
 from gcode2krl.cutting.raw_part import block
+from tests.cells import over_demonstration
 
 HEAD = "G21 G90 G17 G54\nT1 M6\nS13000 M3\nG0 G43 H1 Z30\nG0 X0 Y0\nG0 Z2\n"
 END = "G0 Z30\nM5\nM30\n"
@@ -17,7 +17,7 @@ STOCK = {"stock": {"box_mm": [[-20, -20, -20], [120, 80, 0]]}}
 def rapids_in_stock(tmp_path, body, **data):
     part = tmp_path / "part.nc"
     part.write_text(HEAD + body + END)
-    cell = resolve_cell({"based_on": "demonstration", **data})
+    cell = over_demonstration(data)
     return [issue for issue in predict(part, cell).issues if issue.code == "rapid-in-stock"]
 
 
@@ -39,7 +39,7 @@ def test_a_rapid_back_through_its_own_slot_is_sound(tmp_path):
 @pytest.mark.parametrize("angle_deg", [0.0, 90.0, 37.0])
 def test_what_rapids_meet_does_not_depend_on_the_strips(angle_deg):
     """A slot there and back: the field is divided at another place for each number of threads."""
-    tool = resolve_cell({"based_on": "demonstration"}).tool[1]
+    tool = over_demonstration().tool[1]
     angle = np.radians(angle_deg)
     way = np.array([np.cos(angle), np.sin(angle)])
     for length_mm in (97.0, 103.3, 110.07):

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from gcode2krl import cut, plan_motion
-from gcode2krl.cell import resolve_cell
 from gcode2krl.cell.sections import Tool
 from gcode2krl.cutting.cutter import outline
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.stock_checks import Footprint, standing_mm
 from gcode2krl.gcode import read_stream
+from tests.cells import over_demonstration
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"
 SLOT = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\n"
 
 
 def run(body, data=None, head=HEAD):
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     text = head + body + "M5\nM30\n"
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", cell)
     return cut(toolpath, plan_motion(toolpath, cell), cell)

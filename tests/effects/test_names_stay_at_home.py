@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 from gcode2krl.effects import library
 from tests.conftest import ROOT
 
@@ -52,12 +50,8 @@ def of(file: Path) -> str:
     return file.relative_to(PACKAGE).as_posix()
 
 
-@pytest.mark.parametrize("file", FILES, ids=of)
-def test_no_effect_and_no_parameter_is_known_by_name(file):
-    found = literals(file.read_text(encoding="utf-8")) & NAMES
-    assert found <= ALLOWED.get(of(file), set())
-
-
-def test_a_name_in_a_source_is_found():
-    assert literals('"""Of `backlash`."""\nif name == "backlash":\n    """phase"""\n') == {"backlash"}
+def test_no_effect_and_no_parameter_is_known_by_name():
     assert {"backlash", "gap_deg", "phase", "direction"} <= NAMES
+    for file in FILES:
+        found = literals(file.read_text(encoding="utf-8")) & NAMES
+        assert found <= ALLOWED.get(of(file), set()), file

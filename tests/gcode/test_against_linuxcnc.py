@@ -70,55 +70,6 @@ def _last_rows(toolpath):
     return np.flatnonzero(ends) + 1
 
 
-RUNNING = EXPECTED["programs"]
-programs = pytest.mark.parametrize("case", RUNNING, ids=_name)
-
-
-@programs
-def test_moves_end_where_linuxcnc_ends_them(case):
-    toolpath, moves = _read(case), case["moves"]
-    rows = _last_rows(toolpath)
-
-    np.testing.assert_array_equal(toolpath.position_mm[0], 0.0)
-    assert len(rows) == len(moves)
-    np.testing.assert_allclose(
-        toolpath.position_mm[rows], [move["end"] for move in moves], rtol=0, atol=POSITION_MM
-    )
-    lines = zip(toolpath.source_line[rows].tolist(), moves, strict=True)
-    assert all(move["line"] in (None, line) for line, move in lines)
-
-
-@programs
-def test_moves_are_of_the_kind_linuxcnc_says(case):
-    toolpath, moves = _read(case), case["moves"]
-    rows = _last_rows(toolpath)
-
-    kinds = np.where(toolpath.arc[rows] >= 0, "arc", np.where(toolpath.rapid[rows], "rapid", "feed"))
-    assert kinds.tolist() == [move["kind"] for move in moves]
-    assert not toolpath.rapid[toolpath.arc >= 0].any()
-
-
-@programs
-def test_feeds_are_the_ones_linuxcnc_uses(case):
-    toolpath, moves = _read(case), case["moves"]
-    rows = np.concatenate(([0], _last_rows(toolpath)))
-
-    for before, row, move in zip(rows[:-1], rows[1:], moves, strict=True):
-        if "feed_mm_s" in move:
-            feeds = toolpath.feed_mm_s[before + 1 : row + 1]
-            np.testing.assert_allclose(feeds, move["feed_mm_s"], rtol=1e-9, atol=FEED_MM_S)
-
-
-@programs
-def test_dwells_are_where_linuxcnc_waits(case):
-    toolpath = _read(case)
-    rows = np.concatenate(([0], _last_rows(toolpath)))
-    seconds = [case["start_dwell_s"], *(move["dwell_s"] for move in case["moves"])]
-
-    np.testing.assert_allclose(toolpath.dwell_s[rows], seconds, rtol=0, atol=1e-9)
-    assert toolpath.dwell_s.sum() == pytest.approx(sum(seconds), abs=1e-9)
-
-
 def _directed(angle, sign):
     """Return ``angle`` as turned in the direction ``sign``: above 0, up to a full circle."""
     turned = (sign * np.asarray(angle)) % math.tau
@@ -154,16 +105,33 @@ def _check_arc(points, arc):
     assert chord_error.max() <= CHORD_MM + POSITION_MM
 
 
-@pytest.mark.parametrize(
-    "case",
-    [case for case in RUNNING if any(move["kind"] == "arc" for move in case["moves"])],
-    ids=_name,
-)
-def test_chords_follow_the_arcs_of_linuxcnc(case):
+@pytest.mark.parametrize("case", EXPECTED["programs"], ids=_name)
+def test_a_program_moves_as_linuxcnc_moves(case):
+    """Ends, lines, kinds, feeds, dwells and arcs of its moves."""
     toolpath, moves = _read(case), case["moves"]
-    rows = np.concatenate(([0], _last_rows(toolpath)))
+    rows = _last_rows(toolpath)
+
+    np.testing.assert_array_equal(toolpath.position_mm[0], 0.0)
+    assert len(rows) == len(moves)
+    np.testing.assert_allclose(
+        toolpath.position_mm[rows], [move["end"] for move in moves], rtol=0, atol=POSITION_MM
+    )
+    lines = zip(toolpath.source_line[rows].tolist(), moves, strict=True)
+    assert all(move["line"] in (None, line) for line, move in lines)
+
+    kinds = np.where(toolpath.arc[rows] >= 0, "arc", np.where(toolpath.rapid[rows], "rapid", "feed"))
+    assert kinds.tolist() == [move["kind"] for move in moves]
+    assert not toolpath.rapid[toolpath.arc >= 0].any()
+
+    rows = np.concatenate(([0], rows))
+    seconds = [case["start_dwell_s"], *(move["dwell_s"] for move in moves)]
+    np.testing.assert_allclose(toolpath.dwell_s[rows], seconds, rtol=0, atol=1e-9)
+    assert toolpath.dwell_s.sum() == pytest.approx(sum(seconds), abs=1e-9)
 
     for before, row, move in zip(rows[:-1], rows[1:], moves, strict=True):
+        if "feed_mm_s" in move:
+            feeds = toolpath.feed_mm_s[before + 1 : row + 1]
+            np.testing.assert_allclose(feeds, move["feed_mm_s"], rtol=1e-9, atol=FEED_MM_S)
         if move["kind"] == "arc":
             chord_ends = toolpath.position_mm[before + 1 : row + 1]
             _check_arc(np.vstack((move["start"], chord_ends)), move)

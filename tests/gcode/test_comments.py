@@ -389,13 +389,13 @@ def test_what_is_a_comment_says_the_control(dialect, line, is_read, tmp_path):
 @pytest.mark.slow
 def test_a_comment_anywhere_changes_nothing_or_is_refused(reference_programs, capsys):
     places = [(program, *line) for program in reference_programs for line in lines_of_code(program)]
-    sample = random.Random(6).sample(places, min(len(places), draws(len(places) // 5)))
+    sample = random.Random(6).sample(places, min(len(places), draws(len(places) // 12)))
     count = sum(check_each_place(*place) for place in sample)
     with capsys.disabled():
         print(
             f"\n{count} comments in {len(sample)} lines of {len(reference_programs)} programs: 0 differences"
         )
-    assert count > 8_000
+    assert count > 3_000
 
 
 # --- beside LinuxCNC itself -------------------------------------------------------------------------------

@@ -4,11 +4,11 @@ import io
 
 import pytest
 
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream, tool_comments
 from gcode2krl.gcode.tool_comments import named_tools
+from tests.cells import over_demonstration
 
-CELL = resolve_cell({"based_on": "demonstration"})  # T1 is 16 mm wide, T6 10 mm
+CELL = over_demonstration()  # T1 is 16 mm wide, T6 10 mm
 BODY = "G21 G90 G17\nT{tool} M6\nS9000 M3\nG0 G43 H{tool} Z30\nG0 X0 Y0\nG1 Z-5 F600\nG0 Z30\nM5\nM30\n"
 
 

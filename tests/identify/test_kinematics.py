@@ -1,6 +1,7 @@
 """Small errors of made-up arms come back; the poses are made by independent code."""
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -130,7 +131,7 @@ def test_seventeen_small_errors_of_a_clean_arm():
     assert "instrument's frame" in by_name["A1 zero"].like
 
 
-@pytest.mark.parametrize("arm", pose_arms.MAKERS[::2], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("arm", pose_arms.MAKERS[1::4], ids=lambda arm: arm.name)
 def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
     """The benchmark has all six makers."""
     made = pose_arms.hard(arm, 2)
@@ -141,6 +142,7 @@ def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
     assert found.noise_from == "poses visited again"
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_nine_times_in_ten():
     """Slow drift of the figure would be seen by benchmarks/identify_kinematics.py, which draws more."""
     inside = []
@@ -152,6 +154,7 @@ def test_intervals_hold_the_truth_nine_times_in_ten():
     assert 0.8 < np.mean(inside) < 0.98
 
 
+@pytest.mark.slow
 def test_error_curves_of_joints_are_told_where_they_are():
     arm = pose_arms.clean(pose_arms.KR300, 3)
     columns = pose_arms.measured(arm, 900, 7).columns()
@@ -365,10 +368,8 @@ def test_the_command_says_writes_and_draws(run, tmp_path):
     section = tomllib.loads((tmp_path / "geometry.toml").read_text(encoding="utf-8"))
     assert {each["name"] for each in section["effects"]} <= {"mastering", "link_length", "axis_parallelism"}
     assert (tmp_path / "poses.png").read_bytes().startswith(b"\x89PNG")
-    said = run("identify", "kinematics", str(EXAMPLE)).out
-    assert "mm rms at places left out of the fit" in said
-    with_masses = json.loads(run("identify", "kinematics", str(EXAMPLE), "--masses", "--json").out)
-    assert with_masses["rms_after_mm"] < 0.06
+    said = run("identify", "kinematics", str(EXAMPLE), "--masses").out
+    assert float(re.search(r"-> ([\d.]+) mm rms at places left out of the fit", said)[1]) < 0.06
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,20 @@
-"""A program's triggers carried out from its ``.src`` alone: own reading of the text, own time law.
+"""A program's triggers carried out from its ``.src`` alone, by a time law of its own.
 
-Nothing of the package is used. The time law is the one of the controller's specification, by numbers on a
-fine grid: the programmed speeds pass an average of length dv/a, whose ramps are drawn here, and then one of
-length k, which is a difference of running sums. Real time differs from that of the prediction by the
-standstills whose length nobody knows (HALT, WAIT FOR, outputs, PTP): each lasts `UNKNOWN_S` here, so that an
-announcement on the wrong side of one cannot look right.
+Nothing of the package is used; the text is read by `replay.read_program`. The time law is the one of the
+controller's specification, by numbers on a fine grid: the programmed speeds pass an average of length dv/a,
+whose ramps are drawn here, and then one of length k, which is a difference of running sums. Real time differs
+from that of the prediction by the standstills whose length nobody knows (HALT, WAIT FOR, outputs, PTP): each
+lasts `UNKNOWN_S` here, so that an announcement on the wrong side of one cannot look right.
 """
 
 import itertools
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+
+from tests.krl.replay import Motion, read_program
 
 GRID_S = 0.00025
 UNKNOWN_S = 100.0
@@ -21,90 +22,17 @@ ROOM = 0.8
 """A move that is held back over more than this share of its length runs at the slower speed as a whole."""
 ALIKE = 0.99
 """So does one shorter than 4 times that reach, where the speeds differ by less than this."""
-_NUMBER = r"[-+]?\d+(?:\.\d+)?"
-_SETTING = re.compile(rf"\$(VEL\.CP|ACC\.CP|APO\.CDIS)\s*=\s*({_NUMBER})")
-_MOTION = re.compile(r"(LIN|PTP)\s*\{([^{}]*)\}\s*(C_DIS)?")
-_TRIGGER = re.compile(
-    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:([$\w]+(?:\[\d+\])?)=(-?\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
-)
+_DWELL = re.compile(r"WAIT SEC ([\d.]+) ; dwell")
+_LASTS_NO_TIME = re.compile(r"TRIGGER |(REAL|INT|BOOL)\b|WAIT SEC [\d.]+ ; dwell$")
 
 
-@dataclass
-class Line:
-    """A motion of the text with what is in force."""
-
-    kind: str
-    values: dict
-    blend: bool
-    speed_mm_s: float
-    acceleration_mm_s2: float
-    cdis_mm: float
-    tool: RigidTransform | None
-    triggers: list = field(default_factory=list)
-    """(delay in s, variable or subprogram, numbers) of the triggers that stand before it."""
-    wait_s: float = 0.0
-    """Stated dwell before it."""
-    unknown: bool = False
-    """Something of unknown length happens before it."""
-
-    @property
-    def pose(self):
-        return frame(self.values)
-
-
-def frame(values):
-    """Return a KUKA frame, Rz(A)·Ry(B)·Rx(C)."""
-    rotation = Rotation.from_euler("ZYX", [values[key] for key in "ABC"], degrees=True)
-    return RigidTransform.from_components([values[key] for key in "XYZ"], rotation)
-
-
-def read_lines(path):
-    """Return the motions of a program in the order of execution."""
-    blocks, name = {}, None
-    for raw in path.read_text("ascii").splitlines():
-        text = raw.strip()
-        if found := re.match(r"DEF (\w+)\(", text):
-            name = found[1]
-            blocks[name] = []
-        elif text == "END":
-            name = None
-        elif name is not None and text:
-            blocks[name].append(text)
-    state = {"VEL.CP": math.nan, "ACC.CP": math.nan, "APO.CDIS": math.nan, "tool": None}
-    lines, waiting = [], {"triggers": [], "wait_s": 0.0, "unknown": False}
-
-    def run(block):
-        nonlocal waiting
-        for text in blocks[block]:
-            if (call := re.fullmatch(r"(\w+)\( \)", text)) and call[1] in blocks:
-                run(call[1])
-            elif text.startswith(";") or re.match(r"(DECL|EXT|REAL|INT|BOOL)\b", text):
-                continue
-            elif found := _SETTING.fullmatch(text):
-                state[found[1]] = float(found[2])
-            elif found := re.fullmatch(r"\$TOOL=\{([^{}]*)\}", text):
-                state["tool"], waiting["unknown"] = frame(components(found[1])), True
-            elif found := re.fullmatch(rf"WAIT SEC ({_NUMBER}) ; dwell", text):
-                waiting["wait_s"] += float(found[1])
-            elif text.startswith("TRIGGER"):
-                found = _TRIGGER.fullmatch(text)
-                assert found, text
-                numbers = [float(word) for word in (found[3] or found[5]).split(",")]
-                waiting["triggers"].append((int(found[1]) / 1000.0, found[2] or found[4], numbers))
-            elif found := _MOTION.fullmatch(text):
-                in_force = (state["VEL.CP"] * 1e3, state["ACC.CP"] * 1e3, state["APO.CDIS"], state["tool"])
-                lines.append(Line(found[1], components(found[2]), bool(found[3]), *in_force, **waiting))
-                waiting = {"triggers": [], "wait_s": 0.0, "unknown": False}
-            else:
-                waiting["unknown"] = True
-
-    run(next(iter(blocks)))
-    return lines
-
-
-def components(text):
-    """Return the numbers of ``X 1.0,Y 2.0,…``."""
-    return {word.split()[0]: float(word.split()[1]) for word in text.split(",")}
+def stands_before(motions: tuple[Motion, ...], row: int) -> tuple[float, bool]:
+    """Return the stated dwell in s before a motion, and whether it is preceded by what lasts unknown time."""
+    motion, before = motions[row], motions[row - 1]
+    dwells = [_DWELL.fullmatch(text) for text in motion.before]
+    changed = motion.tool is not before.tool or motion.base is not before.base
+    unknown = changed or not all(_LASTS_NO_TIME.match(text) for text in motion.before)
+    return sum(float(dwell[1]) for dwell in dwells if dwell), unknown or "PTP" in (motion.kind, before.kind)
 
 
 # --- the time law -----------------------------------------------------------------------------------------
@@ -360,23 +288,23 @@ class Replay:
 
 def replay(path, first, last, law):
     """Carry a program out between the ends of the motions ``first`` and ``last``, where it rests."""
-    lines = read_lines(path)
+    motions = read_program(path).motions
     fired, sections, chains = [], [(0.0, 0.0)], []
     clock = ahead = 0.0
     row = first + 1
-    for line in lines[: first + 1] + lines[last + 1 :]:
-        assert not line.triggers, "a trigger outside the predicted motion"
+    for motion in motions[: first + 1] + motions[last + 1 :]:
+        assert not motion.triggers, "a trigger outside the predicted motion"
     while row <= last:
-        clock += lines[row].wait_s
-        if lines[row].unknown or lines[row].kind == "PTP" or lines[row - 1].kind == "PTP":
+        wait_s, unknown = stands_before(motions, row)
+        clock += wait_s
+        if unknown:
             ahead += UNKNOWN_S
             sections.append((clock, clock + ahead))
         rows = [row]
-        while lines[rows[-1]].blend and law.advance > 0 and rows[-1] < last:
-            assert not lines[rows[-1] + 1].unknown
-            assert lines[rows[-1] + 1].wait_s == 0.0
+        while motions[rows[-1]].blend and law.advance > 0 and rows[-1] < last:
+            assert stands_before(motions, rows[-1] + 1) == (0.0, False)
             rows.append(rows[-1] + 1)
-        parts = [_move(lines, k) for k in rows]
+        parts = [_move(motions, k) for k in rows]
         reverse = next(
             (k for k, (m, n) in enumerate(itertools.pairwise(parts)) if m.way @ n.way < -1 + 1e-12),
             None,
@@ -384,12 +312,12 @@ def replay(path, first, last, law):
         if reverse is not None:  # a reversal is an exact stop whatever the text says
             rows, parts = rows[: reverse + 1], parts[: reverse + 1]
         if parts[0].length < 1e-6 and len(parts) == 1:  # after a tool change the tip may be there already
-            assert not lines[row].triggers
+            assert not motions[row].triggers
             row += 1
             continue
         begins, ends, duration, place = chain_law(parts, law)
         for k, begin, end in zip(rows, begins, ends, strict=True):
-            for delay, name, numbers in lines[k].triggers:
+            for delay, name, numbers in motions[k].triggers:
                 at = clock + begin + delay
                 fired.append(Fired(k, at, at + ahead, clock + end, name, numbers))
         chains.append((clock, clock + duration, place))
@@ -398,19 +326,19 @@ def replay(path, first, last, law):
     return Replay(fired, clock, sections, chains)
 
 
-def _move(lines, k):
+def _move(motions, k):
     """Return the way of a motion; where the tool changed, another tip begins it."""
-    line, before = lines[k], lines[k - 1]
+    motion, before = motions[k], motions[k - 1]
     start = before.pose
-    if line.tool is not None and before.tool is not None:
-        start = start * before.tool.inv() * line.tool
-    way = line.pose.translation - start.translation
+    if motion.tool is not None and before.tool is not None:
+        start = start * before.tool.inv() * motion.tool
+    way = motion.pose.translation - start.translation
     length = float(np.linalg.norm(way))
     return Move(
         start.translation,
         way / max(length, 1e-300),
         length,
-        line.speed_mm_s,
-        line.acceleration_mm_s2,
-        line.cdis_mm if line.blend else 0.0,
+        motion.speed_m_s * 1e3,
+        motion.acceleration_m_s2 * 1e3,
+        motion.cdis_mm if motion.blend else 0.0,
     )

@@ -1,13 +1,14 @@
 """A small part with everything that becomes KRL: two tools, spindle, coolant, dwell, blending."""
 
 import io
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from gcode2krl import set_targets, write_krl
-from gcode2krl.cell import resolve_cell
+from gcode2krl import set_targets, verify_krl, write_krl
 from gcode2krl.gcode import read_stream
+from tests.cells import over_demonstration
 
 PART = """G21 G90 G17 G40 G49 G80 G94
 G54 G64 P0.02
@@ -55,7 +56,7 @@ class Made:
     ):
         self.part = folder / f"{stem}.nc"
         self.part.write_text(text)
-        self.cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+        self.cell = over_demonstration(data)
         self.toolpath = read(text, self.cell, self.part.name if into_folder else "part.nc")
         self.targets = set_targets(self.toolpath, self.cell)
         output = folder if into_folder else folder / f"{stem}.src"
@@ -65,6 +66,10 @@ class Made:
     @property
     def lines(self) -> list[str]:
         return self.src.read_bytes().decode("utf-8").split("\n")[:-1]
+
+
+verified = partial(verify_krl, forces=False)
+"""The text is read back and compared; hazards with forces have tests/cli/test_verify_hazards.py."""
 
 
 def read(text: str, cell, name: str = "part.nc"):

@@ -12,9 +12,6 @@ from tests.krl.brute_replay import Law, replay
 from tests.krl.replay import read_program
 
 FINE_S = 0.0005
-_TRIGGER = re.compile(
-    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:(\$\w+\[\d+\])=(\d+)|GK_PILOT\(([^()]*)\) PRIO=-1)"
-)
 STOPS_NOTHING = re.compile(r"TRIGGER |\$(VEL|APO)\.")
 
 
@@ -83,24 +80,14 @@ def breaks_of_blending(path):
 
 def _fire_along_motion(path, targets, cell):
     """The same along a finely sampled Motion: arc length from positions, corners from points on them."""
-    program = read_program(path)
-    motions = program.motions
+    motions = read_program(path).motions
     fine = plan_motion(targets, cell, FINE_S)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine.position_mm, axis=0), axis=1))])
     begin, end = _instants(motions, fine, way, targets, cell)
-    rows, delays, variables, numbers = [], [], [], []
-    for row, motion in enumerate(motions):
-        for statement in motion.before:
-            if not statement.startswith("TRIGGER"):
-                continue
-            found = _TRIGGER.fullmatch(statement)
-            assert found, statement
-            rows.append(row)
-            delays.append(int(found[1]) / 1000)
-            variables.append(found[2] or "GK_PILOT")
-            numbers.append(tuple(float(word) for word in (found[3] or found[4]).split(",")))
+    fired = [(row, *trigger) for row, motion in enumerate(motions) for trigger in motion.triggers]
+    rows, delays, variables, numbers = zip(*fired, strict=True) if fired else ((), (), (), ())
     at = np.array(rows, dtype=int)
-    return Fired(at, begin[at] + np.array(delays), end[at], tuple(variables), tuple(numbers))
+    return Fired(at, begin[at] + np.array(delays), end[at], variables, tuple(map(tuple, numbers)))
 
 
 def _instants(motions, fine, way, targets, cell):

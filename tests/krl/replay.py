@@ -1,6 +1,10 @@
 """An independent replay of a KRL program: text by regular expressions, poses by scipy, joints by OPW.
 
 It shares nothing with the package: what it finds is what a controller with this robot would do.
+`read_program` is the one reader of every replay here: of joints (`replay_joints`), and of times and triggers
+(`brute_replay`, `pilot_replay`). Three readers of KRL know nothing of each other: the package's own, by which
+`verify` refuses (`gcode2krl/krl/read.py` and its scanner), this one, and the grammar that is executed
+(`language`, `execution`).
 """
 
 import math
@@ -19,10 +23,13 @@ FrameData = Mapping[int, RigidTransform]
 _NUMBER = r"[-+]?\d+(?:\.\d+)?"
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)\s*\(", re.I)
 _MOTION = re.compile(r"(PTP|LIN)\s*\{([^{}]*)\}\s*(C_DIS)?", re.I)
-_SETTING = re.compile(rf"\$(VEL\.CP|APO\.CDIS)\s*=\s*({_NUMBER})", re.I)
+_SETTING = re.compile(rf"\$(VEL\.CP|ACC\.CP|APO\.CDIS)\s*=\s*({_NUMBER})", re.I)
 _FRAME = re.compile(r"\$(BASE|TOOL)\s*=\s*\{([^{}]*)\}", re.I)
 _NUMBERED = re.compile(r"BAS\s*\(\s*#(BASE|TOOL)\s*,\s*(\d+)\s*\)", re.I)
 _CALL = re.compile(r"(\w+)\s*\(\s*\)", re.I)
+_TRIGGER = re.compile(
+    r"TRIGGER WHEN DISTANCE=0 DELAY=(\d+) DO (?:([$\w]+(?:\[\d+\])?)=(-?\d+)|(\w+)\(([^()]*)\) PRIO=-1)"
+)
 _COMPONENT = re.compile(rf"([XYZABCST]|A[1-6])\s+({_NUMBER})", re.I)
 
 
@@ -35,11 +42,12 @@ class Motion:
     blend: bool
     line: int
     speed_m_s: float
+    acceleration_m_s2: float
     cdis_mm: float
     base: RigidTransform | None
     tool: RigidTransform | None
     before: tuple[str, ...] = field(repr=False)
-    """Statements since the motion before (settings of speed and CDIS, frames and calls left out)."""
+    """Statements since the motion before; settings of speed and CDIS, frames and calls left out."""
 
     @property
     def joints_deg(self) -> np.ndarray | None:
@@ -47,6 +55,14 @@ class Motion:
         if "A1" not in self.values:
             return None
         return np.array([self.values[f"A{k}"] for k in range(1, 7)])
+
+    @property
+    def triggers(self) -> list[tuple[float, str, list[float]]]:
+        """(delay in s, variable or subprogram, numbers) of the triggers that stand before it."""
+        found = [_TRIGGER.fullmatch(text) for text in self.before if text.startswith("TRIGGER")]
+        assert all(found), self.before
+        numbers = [[float(word) for word in (one[3] or one[5]).split(",")] for one in found]
+        return [(int(one[1]) / 1000.0, one[2] or one[4], of) for one, of in zip(found, numbers, strict=True)]
 
     @property
     def pose(self) -> RigidTransform:
@@ -91,15 +107,15 @@ def read_program(
         for name, lines in _blocks(file.read_text("ascii")):
             blocks.setdefault(name, lines)
     main = next(iter(blocks))
-    state: dict[str, Any] = {"VEL.CP": math.nan, "APO.CDIS": math.nan, "BASE": None, "TOOL": None}
+    state: dict[str, Any] = dict.fromkeys(("VEL.CP", "ACC.CP", "APO.CDIS"), math.nan)
+    state |= {"BASE": None, "TOOL": None}
     data = {"BASE": base_data or {}, "TOOL": tool_data or {}}
     motions: list[Motion] = []
     since: list[str] = []
     for number, text in _executed(blocks, main):
         if found := _MOTION.fullmatch(text):
-            in_force = (state["VEL.CP"], state["APO.CDIS"], state["BASE"], state["TOOL"])
             values, blend = components(found[2]), found[3] is not None
-            motions.append(Motion(found[1].upper(), values, blend, number, *in_force, tuple(since)))
+            motions.append(Motion(found[1].upper(), values, blend, number, *state.values(), tuple(since)))
             since.clear()
         elif found := _SETTING.fullmatch(text):
             state[found[1].upper()] = float(found[2])
@@ -116,7 +132,7 @@ def _blocks(text: str) -> Iterator[tuple[str, list[tuple[int, str]]]]:
     name, lines = "", []
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
-        if '"' not in line:
+        if '"' not in line and not line.startswith("WAIT"):  # behind a wait stands whose it is
             line = line.split(";")[0].strip()
         if not line or line[0] in "&;":
             continue

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell, predict, set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_gcode
-from gcode2krl.krl import verify_krl
 from gcode2krl.krl.read import read_texts
 from gcode2krl.translation import Order, carry_out
+from tests.cells import over_demonstration
 from tests.conftest import draws
+from tests.krl.conftest import verified
 
 HEAD = "G21 G90 G94 G17\nT1 M6\nS10000 M3\nG0 G43 H1 X0 Y0 Z40\nG1 Z0 F3000\n"
 END = "G0 Z60\nM5\nM30\n"
@@ -24,7 +24,7 @@ LINE = re.compile(r"(LIN|CIRC) (?:\{X (\S+),Y (\S+),Z (\S+)\},)?\{X (\S+),Y (\S+
 
 def cell_with_arcs(**more):
     controller = {"circ": True, **more.pop("controller", {})}
-    return resolve_cell({"based_on": "demonstration", "controller": controller, **more})
+    return over_demonstration({"controller": controller, **more})
 
 
 def random_arcs(rng, count=8):
@@ -80,13 +80,13 @@ def translated(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(20)))]
+    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(8)))]
 )
 def test_random_arcs_go_where_the_g_code_goes(translated, seed):
     text, arcs = random_arcs(np.random.default_rng(seed))
     program, toolpath, cell = translated(text, cell_with_arcs(clearance={"z_mm": 400}))
     source = program.texts["ARC.src"].decode()
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
     assert program.report.max_deviation_mm < OFF_MM
     turned = np.zeros(len(arcs))
     at = None
@@ -148,7 +148,7 @@ def test_one_motion_instead_of_many_with_the_same_speed(translated):
 def test_what_is_no_circle_stays_lin(translated, text):
     program, toolpath, cell = translated(text)
     assert b"CIRC" not in program.texts["ARC.src"]
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
 
 
 def circ_line(source):
@@ -173,7 +173,7 @@ def test_a_changed_arc_is_found(translated, pattern, other):
     changed = re.sub(pattern, other, line, count=1)
     assert changed != line
     file.write_bytes(source.replace(line, changed, 1).encode())
-    report = verify_krl(file, toolpath, cell)
+    report = verified(file, toolpath, cell)
     assert not report.ok
     number = source[: source.index(line)].count("\n") + 1
     assert any(issue.line == number for issue in report.issues if issue.severity == "error")
@@ -185,7 +185,7 @@ def test_an_arc_that_leaves_its_targets_is_named(translated):
     source = file.read_bytes().decode()
     line = circ_line(source)
     file.write_bytes(source.replace(line, re.sub(r",Y (\S+),", r",Y -\1,", line, count=1), 1).encode())
-    issues = verify_krl(file, toolpath, cell).issues
+    issues = verified(file, toolpath, cell).issues
     found = [issue.line for issue in issues if issue.code == "krl-motion-unknown"]
     assert found[0] == source[: source.index(line)].count("\n") + 1
 
@@ -194,12 +194,12 @@ def test_another_kind_of_orientation_is_found(translated):
     program, toolpath, cell = translated(ARCS)
     file = program.files[0]
     file.write_bytes(file.read_bytes().replace(b"#BASE\r\n$IPO", b"#PATH\r\n$IPO"))
-    assert not verify_krl(file, toolpath, cell).ok
+    assert not verified(file, toolpath, cell).ok
 
 
 def test_statements_between_arcs_stay_where_they_are(translated):
     program, toolpath, cell = translated(ARCS + "M8\nG2 X60 Y30 R30\nG4 P0.5\nG3 X30 Y0 R30\nM9\n")
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
     source = program.texts["ARC.src"].decode()
     assert re.search(r"CIRC [^\n]*\}\r\nWAIT SEC 0\.500", source)
 
@@ -210,7 +210,7 @@ def test_parts_of_a_long_program(translated, split):
     program, toolpath, cell = translated(f"{ARCS}G1 X0 Y0\n" * 5, cell, split=split)
     whole = b"".join(program.texts[name] for name in program.texts)
     assert whole.count(b"CIRC {") >= 8
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
 
 
 def test_a_pilot_force_and_arcs(tmp_path):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl import write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.pilot import read_pilot
+from tests.cells import over_demonstration
 from tests.conftest import draws
 from tests.krl.brute_replay import Law, replay
 from tests.krl.conftest import read
@@ -74,7 +74,7 @@ class Case:
     """A program with a pilot force, and what the replay finds in it."""
 
     def __init__(self, folder, text, data, steps):
-        self.cell = resolve_cell({"based_on": "demonstration", **data})
+        self.cell = over_demonstration(data)
         prediction = moved(read(text, self.cell), self.cell)
         self.force_N = cutting_below(prediction, force_N=300.0, ramp_s=0.0 if steps else 0.3)
         self.prediction = with_forces(prediction, self.force_N)
@@ -119,7 +119,7 @@ class Case:
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 8 + draws(40)))]
+    "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 8 + draws(12)))]
 )
 def test_leads_of_generated_programs(tmp_path, seed):
     """Several cells, both forms, with steps of the force and without."""

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl import set_targets, verify_krl, write_krl
-from gcode2krl.cell import resolve_cell
+from gcode2krl import set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_gcode
 from gcode2krl.krl import composition, read_krl
+from tests.cells import over_demonstration
 from tests.conftest import HEEDS_CTRL_C, ROOT
+from tests.krl.conftest import verified
 
 WAVE = "".join(f"G1 X{k / 4} Y{(k * 7) % 5} F{900 + k % 3 * 300}\n" for k in range(900))
 PART = (
@@ -78,7 +79,7 @@ def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request
 @pytest.fixture
 def targets(tmp_path):
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
-    cell = resolve_cell({"based_on": "demonstration", "program": {"max_lines": 250}})
+    cell = over_demonstration({"program": {"max_lines": 250}})
     toolpath = read_gcode(tmp_path / "part.nc", cell)
     return toolpath, set_targets(toolpath, cell), cell
 
@@ -98,11 +99,11 @@ def test_a_difference_in_a_long_file_is_found(targets, tmp_path, small):
     toolpath, rows, cell = targets
     written = write_krl(rows, tmp_path / "part.src", cell)
     text = written.texts["PART.src"]
-    assert verify_krl(tmp_path / "part.src", toolpath, cell).ok
+    assert verified(tmp_path / "part.src", toolpath, cell).ok
     at = [found.start(1) for found in re.finditer(rb"LIN \{X (\d)", text)][3000]
     other = b"%d" % (9 - int(text[at : at + 1]))
     (tmp_path / "part.src").write_bytes(text[:at] + other + text[at + 1 :])
-    report = verify_krl(tmp_path / "part.src", toolpath, cell)
+    report = verified(tmp_path / "part.src", toolpath, cell)
     assert [issue.code for issue in report.issues if issue.severity == "error"] == ["verify-position"]
     assert report.issues[0].line == text[:at].count(b"\n") + 1
     assert read_krl(tmp_path / "part.src").texts["part.src"] == (tmp_path / "part.src").read_bytes()

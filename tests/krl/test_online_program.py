@@ -6,11 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gcode2krl import verify_krl, write_krl
+from gcode2krl import write_krl
 from gcode2krl.cell import controller_axes
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.frames import abc_from_rotation
 from gcode2krl.krl.rsi_rules import rsi_issues
+from tests.krl.conftest import verified
 from tests.krl.forces import cutting_below, with_forces
 from tests.krl.test_pilot_program import predicted
 from tests.krl.test_verify import change, delete, errors, insert, motions_of, tampered
@@ -137,7 +138,7 @@ def test_all_files_are_written_together(online, tmp_path):
         data = file.read_bytes()
         assert data.isascii()
         assert data.count(b"\n") == data.count(b"\r\n") > 3
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
     assert [i.code for i in made.program.issues if i.severity == "warning"] == []
 
 
@@ -161,7 +162,7 @@ def test_the_pilot_is_set_before_rsi_is_on(tmp_path, form):
         started = {"index": "$SEN_PINT[1]=-1", "values": "$SEN_PREA[4]=0.0"}[form]
         assert text.index(started) < text.index("$SEN_PINT[2]=") < text.index("RSI_CREATE")
         assert text.index("RSI_ON(") < text.index("TRIGGER")
-    report = verify_krl(program.files[0], prediction.toolpath, prediction.cell, prediction=prediction)
+    report = verified(program.files[0], prediction.toolpath, prediction.cell, prediction=prediction)
     assert report.ok, [issue.text() for issue in report.issues]
 
 
@@ -175,7 +176,7 @@ def test_settings_of_the_cell_reach_program_and_files(make, cycle_s):
     assert "LIN_REL {Z 12.500} #TOOL" in text
     assert "$OUT[78] (on in T1)" in text
     assert "<IP_NUMBER>10.0.0.9<" in (made.src.parent / "B_ETH.xml").read_text("ascii")
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 @pytest.mark.parametrize("axis", ["+x", "-x", "-y", "-z"])
@@ -203,7 +204,7 @@ def test_long_programs_switch_rsi_in_the_main_program(online, split):
     parts = [file.read_text("ascii") for file in made.program.files if re.search(r"_\d{3}\.src$", file.name)]
     assert all("RSI" not in part for part in parts)
     assert len(parts) == (0 if split == "defs" else 3)
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert report.ok, [issue.text() for issue in report.issues]
 
 
@@ -239,7 +240,7 @@ def test_programs_that_must_not_be_corrected_in_one_go(online, make, tmp_path, c
 
 def test_a_halt_may_be_released_and_a_tool_change_may_not(online):
     made = online(REFUSED["a halt"][0], allow=["online-halt:13"])
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
     with pytest.raises(NotUnderstoodError, match="cannot be released"):
         online(REFUSED["two tools"][0], allow=["online-tool:13"])
 
@@ -345,7 +346,7 @@ def test_tampering_is_noticed(online, case):
     edit, code = TAMPERINGS[case]
     made = online()
     tampered(made, edit)
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert not report.ok
     assert code in {issue.code for issue in errors(report)}, [issue.text() for issue in errors(report)]
 
@@ -359,7 +360,7 @@ def test_the_files_beside_the_program_are_looked_at(online, file_name, deed):
         file.unlink()
     else:
         file.write_text(file.read_text("ascii").replace('"2.5"', '"25"').replace("49152", "49153"), "ascii")
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert [issue.code for issue in errors(report)] == ["rsi-file"]
     assert file_name in errors(report)[0].message
 
@@ -367,7 +368,7 @@ def test_the_files_beside_the_program_are_looked_at(online, file_name, deed):
 def test_files_of_another_cell_are_noticed(online, make):
     made = online()
     other = make(PART, stem="other", data={"online": {"most_mm": 1.0}})
-    codes = [i.code for i in errors(verify_krl(made.src, made.toolpath, other.cell))]
+    codes = [i.code for i in errors(verified(made.src, made.toolpath, other.cell))]
     assert codes == ["verify-cell-changed", "rsi-file", "rsi-file"]
 
 
@@ -376,7 +377,7 @@ def test_laid_out_anew_it_still_verifies(online):
     text = made.src.read_bytes().decode("ascii")
     for rewritten in (text.lower(), text.replace("\r", ""), re.sub(r"(?m)^;.*\r?\n", "", text)):
         made.src.write_bytes(rewritten.encode("ascii"))
-        report = verify_krl(made.src, made.toolpath, made.cell)
+        report = verified(made.src, made.toolpath, made.cell)
         assert report.ok, [issue.text() for issue in report.issues]
 
 

@@ -10,7 +10,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.krl.composition import TextLayout, compose
@@ -18,8 +17,9 @@ from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.verify import compare
 from gcode2krl.robot import ptp_joints
 from gcode2krl.tables import Simplified, rows_at
+from tests.cells import over_demonstration
 
-CELL = resolve_cell({"based_on": "demonstration"})
+CELL = over_demonstration()
 PART = """G21 G90 G17 G40 G49 G80 G94
 G54 G64
 T1 M6
@@ -256,7 +256,7 @@ def written(tmp_path):
 
 
 def verified(part, program, **options):
-    return verify_krl(program.files[0], read_gcode(part, CELL), CELL, **options)
+    return verify_krl(program.files[0], read_gcode(part, CELL), CELL, forces=False, **options)
 
 
 def test_a_written_program_agrees_with_the_original(written):

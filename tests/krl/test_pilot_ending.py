@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from gcode2krl import verify_krl, write_krl
-from gcode2krl.cell import load_cell, resolve_cell
+from gcode2krl import write_krl
+from gcode2krl.cell import load_cell
 from gcode2krl.errors import RefusedError
 from gcode2krl.krl import pilot_plan
 from gcode2krl.online.pilot_gate import Announced, Gate, estimate, gate_start, pilot_table
 from gcode2krl.pilot import force_at, read_pilot
+from tests.cells import over_demonstration
 from tests.krl.brute_replay import Law, replay
-from tests.krl.conftest import read
+from tests.krl.conftest import read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.replay import read_program
 
@@ -24,7 +25,7 @@ CYCLE_S, LEAD_S, STEP_S = 0.012, 0.040, 0.004
 
 def dense(data=None):
     """A long line with a few knots, then short moves with noise: more knots than can be announced."""
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     prediction = moved(read(f"{HEAD}G1 Z-1 F1500\nG1 X80\n{SHORT}{FOOT}", cell), cell)
     force = cutting_below(prediction, force_N=300.0)
     late = prediction.motion.position_mm[:, 0] > 80.0
@@ -111,7 +112,7 @@ def test_the_receiver_follows_and_then_knows_no_force(ended):
 def test_verify_reads_the_end(ended, tmp_path):
     prediction, program, knots, _, _ = ended
     src = tmp_path / "part.src"
-    report = verify_krl(src, prediction.toolpath, prediction.cell, prediction=prediction)
+    report = verified(src, prediction.toolpath, prediction.cell, prediction=prediction)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.knots == len(knots) == program.pilot.knots
     assert report.pilot.max_error_N <= program.pilot.max_error_N + 1e-6
@@ -120,7 +121,7 @@ def test_verify_reads_the_end(ended, tmp_path):
     delay = int(lines[end].split(b"DELAY=")[1].split()[0])
     lines[end] = lines[end].replace(b"DELAY=%d " % delay, b"DELAY=%d " % (delay + 100))
     src.write_bytes(b"\r\n".join(lines))
-    report = verify_krl(src, prediction.toolpath, prediction.cell, prediction=prediction)
+    report = verified(src, prediction.toolpath, prediction.cell, prediction=prediction)
     assert "end of the pilot force: its end is told too late" in {issue.message for issue in report.issues}
 
 
@@ -165,7 +166,7 @@ def test_what_its_own_check_finds_leaves_it_out_too(tmp_path, monkeypatch):
 @pytest.mark.parametrize("dwell", ["G4 P1.25", "M0"])
 def test_triggers_behind_a_wait_are_not_read_before_it(tmp_path, dwell):
     """Eight knots before a standstill and eight behind it: without it they could not wait together."""
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     body = f"G1 Z-1 F1500\nG1 X10\n{dwell}\nG1 X20\nG1 X20 Y10\n"
     prediction = moved(read(HEAD + body + FOOT, cell), cell)
     motion = prediction.motion
@@ -180,6 +181,6 @@ def test_triggers_behind_a_wait_are_not_read_before_it(tmp_path, dwell):
     assert "pilot-tolerance" not in {issue.code for issue in program.issues}
     assert (read_pilot(tmp_path / "part.pilot.csv")[0].lead_s < 0.1).all()  # nor was one told early
     assert program.pilot.max_active <= 8
-    report = verify_krl(tmp_path / "part.src", prediction.toolpath, cell)
+    report = verified(tmp_path / "part.src", prediction.toolpath, cell)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.max_active == program.pilot.max_active

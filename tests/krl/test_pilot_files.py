@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from gcode2krl import Prediction, set_targets, verify_krl, write_krl
-from gcode2krl.cell import resolve_cell
+from gcode2krl import Prediction, set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl import windows
 from gcode2krl.pilot import read_pilot
-from tests.krl.conftest import PART, read
+from tests.cells import over_demonstration
+from tests.krl.conftest import PART, read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.replay import read_program
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 def part(data=None, text=PART, dt_s=0.012):
     """Predict the part of the other tests, with forces and a deflection."""
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     prediction = moved(read(text, cell), cell, dt_s)
     force = cutting_below(prediction, force_N=300.0)
     return with_forces(prediction, force, force / 400.0)
@@ -102,7 +102,7 @@ def test_pilot_none_leaves_the_motions_alone(made):
     text = src.read_text("ascii")
     assert "TRIGGER" not in text
     assert "SEN_PINT" not in text
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
 
 
 def test_the_cell_decides_the_form(made, tmp_path):
@@ -122,7 +122,7 @@ def test_names_of_the_cell(made, tmp_path):
     assert re.search(r"DO KNOT=0$", text, re.M)
     assert re.search(r"^CHECKSUM=\d+$", text, re.M)
     assert "SEN_PINT" not in text
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
 
 
 def test_standard_output():
@@ -157,7 +157,7 @@ def test_forces_that_are_zero_have_no_knots(made, tmp_path):
     assert program.pilot.min_lead_s is None
     knots, _ = read_pilot(tmp_path / "part.pilot.csv")
     assert len(knots) == 0
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
 
 
 def test_a_motion_of_other_targets_is_refused(tmp_path):
@@ -175,7 +175,7 @@ def test_a_motion_of_other_targets_is_refused(tmp_path):
 
 def test_a_position_alone(tmp_path):
     """A program without any move that could carry a trigger."""
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     prediction = moved(read("G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z50\nM30\n", cell), cell)
     forced = with_forces(prediction, np.zeros((len(prediction.motion), 3)))
     assert write_krl(forced, tmp_path / "part.src").pilot.knots == 0
@@ -194,21 +194,21 @@ def test_parts_of_a_long_program(made, split, form):
     prediction = part({"program": {"max_lines": 100}}, text)
     _, program, src = made(prediction, pilot=form, split=split)
     assert re.search(r"\$SEN_PINT\[2\]=(\d+)", src.read_text("ascii"))[1] == stated
-    report = verify_krl(src, prediction.toolpath, prediction.cell)
+    report = verified(src, prediction.toolpath, prediction.cell)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.knots == program.pilot.knots
     texts = [file.read_text("ascii") for file in program.files if file.suffix == ".src"]
     assert len(texts) == (1 if split == "defs" else len(program.files) - 2)
     for own in texts[1:]:
         assert ("DEF GK_PILOT" in own) == ("DO GK_PILOT(" in own)
-    assert verify_krl(src, prediction.toolpath, whole.cell).ok
+    assert verified(src, prediction.toolpath, whole.cell).ok
 
 
 @pytest.mark.parametrize("dt_s", [0.012, 0.004])
 def test_sample_time_of_the_prediction(made, dt_s):
     prediction, program, src = made(part(dt_s=dt_s))
     assert program.pilot.min_lead_s >= 0.04
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
 
 
 def test_a_tool_measured_along_x(made, tmp_path):
@@ -220,7 +220,7 @@ def test_a_tool_measured_along_x(made, tmp_path):
     force = prediction.forces.force_base_N[np.rint(knots.time_s / 0.012).astype(int)]
     assert knots.force_N[:, 0] == pytest.approx(force[:, 2], abs=0.011)
     assert np.linalg.norm(knots.force_N, axis=1) == pytest.approx(np.linalg.norm(force, axis=1), abs=0.02)
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
 
 
 def test_where_a_delay_begins_is_one_constant(made, monkeypatch):
@@ -228,10 +228,10 @@ def test_where_a_delay_begins_is_one_constant(made, monkeypatch):
     text = PART.replace("G64 P0.02", "G64 P1")
     monkeypatch.setattr(windows, "COUNTS_FROM_END_OF_ARC", False)
     prediction, program, src = made(part(text=text))
-    assert verify_krl(src, prediction.toolpath, prediction.cell).ok
+    assert verified(src, prediction.toolpath, prediction.cell).ok
     assert program.pilot.min_lead_s >= 0.04
     monkeypatch.undo()
-    assert "pilot-lead" in errors(verify_krl(src, prediction.toolpath, prediction.cell))
+    assert "pilot-lead" in errors(verified(src, prediction.toolpath, prediction.cell))
 
 
 # --- what verification finds -----------------------------------------------------------------------------
@@ -281,7 +281,7 @@ def test_tampering_is_noticed(made, name):
     changed = change(text)
     assert changed != text
     src.write_bytes(changed.encode("ascii"))
-    report = verify_krl(src, prediction.toolpath, prediction.cell)
+    report = verified(src, prediction.toolpath, prediction.cell)
     assert code in errors(report), [issue.text() for issue in report.issues]
     lines = {issue.line for issue in report.issues if issue.code == code}
     first = 1 + next(
@@ -309,7 +309,7 @@ def test_tampering_with_values_is_noticed(made, name):
     prediction, _, src = made(pilot="values")
     text = src.read_bytes().decode("ascii")
     src.write_bytes(change(text).encode("ascii"))
-    report = verify_krl(src, prediction.toolpath, prediction.cell)
+    report = verified(src, prediction.toolpath, prediction.cell)
     assert code in errors(report), [issue.text() for issue in report.issues]
 
 
@@ -329,7 +329,7 @@ def test_equal_program_by_hand_verifies(made, form, change):
     text = src.read_bytes().decode("ascii")
     changed = change(text)
     src.write_bytes(changed.encode("ascii"))
-    report = verify_krl(src, prediction.toolpath, prediction.cell)
+    report = verified(src, prediction.toolpath, prediction.cell)
     assert report.ok, [issue.text() for issue in report.issues]
 
 
@@ -366,7 +366,7 @@ def test_changed_sidecar_is_noticed(made, tmp_path, change, code):
     lines = file.read_text("ascii").splitlines()
     change(lines)
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
-    found = errors(verify_krl(src, prediction.toolpath, prediction.cell))
+    found = errors(verified(src, prediction.toolpath, prediction.cell))
     assert code in found
 
 
@@ -375,13 +375,13 @@ def test_sidecar_of_another_program(made, tmp_path):
     prediction, _, src = made()
     made(part(text=PART.replace("X20 Y40", "X20 Y40.2")), name="other.src")
     (tmp_path / "part.pilot.csv").write_bytes((tmp_path / "other.pilot.csv").read_bytes())
-    assert "pilot-checksum" in errors(verify_krl(src, prediction.toolpath, prediction.cell))
+    assert "pilot-checksum" in errors(verified(src, prediction.toolpath, prediction.cell))
 
 
 def test_missing_sidecar(made, tmp_path):
     prediction, _, src = made()
     (tmp_path / "part.pilot.csv").unlink()
-    report = verify_krl(src, prediction.toolpath, prediction.cell)
+    report = verified(src, prediction.toolpath, prediction.cell)
     issue = next(issue for issue in report.issues if issue.code == "pilot-sidecar")
     assert "part.pilot.csv is missing" in issue.message
     assert src.read_text("ascii").splitlines()[issue.line - 1].startswith("TRIGGER")
@@ -391,7 +391,7 @@ def test_unreadable_sidecar(made, tmp_path):
     prediction, _, src = made()
     (tmp_path / "part.pilot.csv").write_text("knot;force\n", encoding="ascii")
     with pytest.raises(NotUnderstoodError, match="pilot-file"):
-        verify_krl(src, prediction.toolpath, prediction.cell)
+        verified(src, prediction.toolpath, prediction.cell)
 
 
 def test_figures_for_other_programs(made):
@@ -406,10 +406,10 @@ def test_figures_for_other_programs(made):
         "max_active",
     }
     assert program.report.as_dict()["pilot"] == figures
-    read_back = verify_krl(src, prediction.toolpath, prediction.cell).as_dict()["pilot"]
+    read_back = verified(src, prediction.toolpath, prediction.cell).as_dict()["pilot"]
     assert read_back["max_error_N"] is None
     assert read_back["knots"] == figures["knots"]
-    assert "pilot" not in verify_krl(made(pilot="none")[2], prediction.toolpath, prediction.cell).as_dict()
+    assert "pilot" not in verified(made(pilot="none")[2], prediction.toolpath, prediction.cell).as_dict()
 
 
 def test_every_byte_is_fit_for_the_controller(made):

@@ -1,25 +1,25 @@
 """Programs with a pilot force: carried out by an independent replay (`pilot_replay`), and verified."""
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gcode2krl import load_cell, plan_motion, read_gcode, verify_krl, write_krl
-from gcode2krl.cell import resolve_cell
+from gcode2krl import load_cell, plan_motion, read_gcode, write_krl
 from gcode2krl.errors import RefusedError
 from gcode2krl.pilot import force_at, read_pilot
+from tests.cells import over_demonstration
+from tests.conftest import EXAMPLES as ALL_EXAMPLES
 from tests.conftest import draws
-from tests.krl.conftest import read
+from tests.krl.conftest import read, verified
 from tests.krl.forces import cutting_below, moved, with_forces
 from tests.krl.pilot_replay import breaks_of_blending, fire, halts_of, most_waiting
 from tests.krl.replay import read_program
 
 pytestmark = pytest.mark.slow
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
+EXAMPLES = [part for part in ALL_EXAMPLES if part.stem != "raster_finish"]  # thousands of lines
 HEAD = "G21 G90 G17 G54 G64\nT1 M6\nS9000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\n"
 FOOT = "G0 Z20\nM30\n"
 CYCLE_S, LEAD_S, REPLAY_S = 0.012, 0.040, 0.002
@@ -30,7 +30,7 @@ the next."""
 
 def predicted(body, data=None):
     """Predict a part that begins above the work at (0, 0, 2)."""
-    cell = resolve_cell({"based_on": "demonstration", **data}) if data else load_cell()
+    cell = over_demonstration(data) if data else load_cell()
     return moved(read(HEAD + body + FOOT, cell), cell)
 
 
@@ -84,7 +84,7 @@ def check(made, in_view=IN_VIEW):
     assert off.max() <= pilot.max_error_N + 1e-6
     assert pilot.max_error_N <= pilot.tolerance_N or "pilot-cycle" in made.codes
     assert pilot.rms_error_N <= pilot.max_error_N + 1e-9
-    report = verify_krl(made.src, made.prediction.toolpath, made.cell, prediction=made.prediction)
+    report = verified(made.src, made.prediction.toolpath, made.cell, prediction=made.prediction)
     assert report.ok, [issue.text() for issue in report.issues]
     assert report.pilot.knots == pilot.knots
     assert report.pilot.max_active == pilot.max_active
@@ -95,24 +95,13 @@ def check(made, in_view=IN_VIEW):
 # --- the examples ---------------------------------------------------------------------------------------
 
 
-LONG = ("cam_style", "contour_arcs", "raster_finish")
-"""Examples of hundreds and thousands of lines: a second, or ten, a test."""
-
-
-def _marks(part: Path):
-    return [pytest.mark.slow] if part.stem in LONG else []
-
-
-@pytest.fixture(
-    scope="module", params=[pytest.param(part, marks=_marks(part), id=part.stem) for part in EXAMPLES]
-)
+@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda part: part.stem)
 def example(request):
     prediction = moved(read_gcode(request.param, load_cell()), load_cell())
     return SimpleNamespace(prediction=prediction, name=request.param.stem)
 
 
-@pytest.mark.parametrize("form", ["index", "values"])
-@pytest.mark.parametrize("ramp_s", [0.0, 0.3], ids=["step", "ramp"])
+@pytest.mark.parametrize(("form", "ramp_s"), [("index", 0.3), ("values", 0.0)])
 def test_examples(example, tmp_path, form, ramp_s):
     """Cuts along the feed that begin with a step or like a square root; the direction turns in corners."""
     made = Written(tmp_path, example.prediction, cutting_below(example.prediction, ramp_s=ramp_s), pilot=form)
@@ -413,9 +402,8 @@ def random_forces(prediction, chance):
 
 
 @pytest.mark.slow
-def test_many_programs(tmp_path, monkeypatch):
+def test_many_programs(tmp_path):
     """Some are carried out by the replay; few are refused, for knots that are too close."""
-    monkeypatch.setattr("os.fsync", lambda descriptor: None)
     chance = np.random.default_rng(20)
     written, refused, pieces, knots = 0, [], 0, 0
     count = draws(15)

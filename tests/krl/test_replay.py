@@ -1,6 +1,5 @@
 """What the written programs do, by an independent replay (`replay`), against the Toolpath."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,23 +8,17 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gcode2krl import load_cell, read_gcode, set_targets, solve_joints, write_krl
 from gcode2krl.cell import resolve_cell
+from tests.conftest import EXAMPLES
 from tests.krl.replay import Kr300, frame, read_program, replay_joints
 
 pytestmark = pytest.mark.slow
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nc"))
 THINNED = {"raster_finish": 10}
 POSITION_MM, ROTATION_DEG, FEED_MM_MIN, JOINT_DEG = 0.002, 0.001, 0.1, 0.01
 RAPID_MM_S = 200.0
 
 
-def _marks(part: Path):
-    return [pytest.mark.slow] if part.stem in THINNED else []
-
-
-@pytest.fixture(
-    scope="module", params=[pytest.param(part, marks=_marks(part), id=part.stem) for part in EXAMPLES]
-)
+@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda part: part.stem)
 def run(request, tmp_path_factory):
     """Translate an example with the default cell and replay it."""
     part, folder = request.param, tmp_path_factory.mktemp("replayed")

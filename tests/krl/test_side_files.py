@@ -5,16 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from gcode2krl import verify_krl
 from gcode2krl.krl import write_krl
 from gcode2krl.pipeline import predict_toolpath
+from tests.krl.conftest import verified
 from tests.krl.test_verify import ZIGZAG, errors
 
 pytestmark = pytest.mark.slow
 
 
 def check(made, src=None):
-    return verify_krl(src or made.src, made.toolpath, made.cell)
+    return verified(src or made.src, made.toolpath, made.cell)
 
 
 def statements(text):

@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from gcode2krl import Prediction, predict, read_gcode, set_targets, verify_krl, write_krl
+from gcode2krl import Prediction, predict, read_gcode, set_targets, write_krl
 from gcode2krl.cell import resolve_cell
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.restart.material import restarted
 from gcode2krl.translation.compensation import compensated
+from tests.krl.conftest import verified
 
 CELL = resolve_cell(
     {
@@ -48,7 +49,7 @@ def test_compensated_targets_keep_to_the_original_within_the_correction(part, pr
     loaded = Prediction.load(tmp_path / "saved")
     assert loaded.targets.correction_mm == moved.targets.correction_mm
     toolpath = read_gcode(part, CELL)
-    report = verify_krl(tmp_path / "wave.src", toolpath, CELL, prediction=loaded)
+    report = verified(tmp_path / "wave.src", toolpath, CELL, prediction=loaded)
     assert report.ok, report.issues
 
 
@@ -56,7 +57,7 @@ def test_a_pilot_force_cuts_long_moves_and_still_agrees(part, prediction, tmp_pa
     program = write_krl(prediction, tmp_path / "wave.src", pilot="values")
     assert len(program.targets) > len(prediction.targets)  # pieces for triggers
     assert program.report.original.left_out > 200
-    report = verify_krl(tmp_path / "wave.src", read_gcode(part, CELL), CELL, simplify_mm=0.01)
+    report = verified(tmp_path / "wave.src", read_gcode(part, CELL), CELL, simplify_mm=0.01)
     assert report.ok, report.issues
 
 
@@ -68,14 +69,14 @@ def test_a_restart_is_simplified_from_its_line_on(part, tmp_path):
     assert prediction.targets.simplified.left_out > 50
     program = write_krl(prediction, tmp_path / "wave.src")
     assert program.report.original.left_out > 50
-    report = verify_krl(tmp_path / "wave.src", begun, CELL, simplify_mm=0.01)
+    report = verified(tmp_path / "wave.src", begun, CELL, simplify_mm=0.01)
     assert report.ok, report.issues
 
 
 def test_a_program_corrected_online_is_simplified(part, prediction, tmp_path):
     program = write_krl(prediction, tmp_path / "wave.src", online="WAVE_RSI")
     assert program.report.original.left_out > 200
-    report = verify_krl(tmp_path / "wave.src", read_gcode(part, CELL), CELL, simplify_mm=0.01)
+    report = verified(tmp_path / "wave.src", read_gcode(part, CELL), CELL, simplify_mm=0.01)
     assert report.ok, report.issues
 
 

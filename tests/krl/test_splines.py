@@ -7,11 +7,11 @@ import pytest
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from gcode2krl import predict, read_gcode, set_targets, write_krl
-from gcode2krl.krl import verify_krl
 from gcode2krl.program.splines import FEWEST, OFF_MM, splines_of
 from gcode2krl.runkit.accepted import read_program
 from tests.cells import over_demonstration
 from tests.conftest import draws
+from tests.krl.conftest import verified
 
 HEAD = "G21 G90 G94 G17\nT1 M6\nS10000 M3\nG0 G43 H1 X0 Y0 Z40\nG0 Z5\nG1 Z0 F800\n"
 END = "G0 Z60\nM5\nM30\n"
@@ -84,7 +84,7 @@ def test_a_chain_becomes_a_block_that_begins_and_ends_at_rest(translated):
     assert (targets.cdis_mm[chain.first : chain.end] > 0.0).all()
     assert np.abs(block[1:] - targets.position_mm[chain.first : chain.end + 1]).max() <= 0.0005 + 1e-9
     assert program.report.ok
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
     assert "spline" in {issue.code for issue in program.issues}
 
 
@@ -94,14 +94,14 @@ def test_without_the_word_nothing_changes(translated):
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(20)))]
+    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 4 + draws(8)))]
 )
 def test_random_programs_are_read_back_and_stay_near_their_chords(seed, translated):
     """Between the points: the cubic spline, and the one of Akima that bends where its points do."""
     rng = np.random.default_rng(seed)
     program, toolpath, cell = translated("".join(random_curve(rng) for _ in range(2)))
     assert program.report.max_deviation_mm <= 0.005
-    report = verify_krl(program.files[0], toolpath, cell)
+    report = verified(program.files[0], toolpath, cell)
     assert report.ok, report.issues
     assert report.max_deviation_mm <= 0.005
     for block in blocks_in(program):
@@ -130,7 +130,7 @@ def test_arcs_go_first_where_both_are_asked_for(translated):
     source = program.texts["SPLINES.src"]
     assert source.count(b"\r\nCIRC ") >= 1
     assert source.count(b"\r\nSPLINE\r\n") == 1
-    assert verify_krl(program.files[0], toolpath, cell).ok
+    assert verified(program.files[0], toolpath, cell).ok
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_an_edited_block_is_told(old, new, code, translated):
     text = file.read_bytes().decode("ascii")
     assert old in text
     file.write_bytes(text.replace(old, new, 1).encode("ascii"))
-    report = verify_krl(file, toolpath, cell)
+    report = verified(file, toolpath, cell)
     assert not report.ok
     assert code in {issue.code for issue in report.issues}
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl import verify_krl, write_krl
+from gcode2krl import write_krl
 from gcode2krl.errors import RefusedError
+from tests.krl.conftest import verified
 from tests.krl.replay import read_program
 
 
@@ -32,7 +33,7 @@ def test_verify_refuses_a_program_that_blends_over_its_first_position(make):
     lines = made.src.read_bytes().split(b"\r\n")
     lines[motion.line - 1] += b" C_DIS"
     made.src.write_bytes(b"\r\n".join(lines))
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     found = [issue for issue in report.issues if issue.code == "verify-start"]
     assert [(issue.severity, issue.line) for issue in found] == [("error", motion.line)]
     assert "translate again" in found[0].remedy

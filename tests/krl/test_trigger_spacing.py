@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from gcode2krl.cell import resolve_cell
 from gcode2krl.krl.triggers import place_triggers
 from gcode2krl.krl.windows import Windows
+from tests.cells import over_demonstration
 
 CYCLE_S, OFF_S = 0.012, 0.0015
 """A motion's start in the samples may be so far off on either side."""
@@ -33,7 +33,7 @@ def windows_of_short_motions(chance, count):
 
 def test_triggers_of_two_motions_never_act_in_one_cycle():
     chance = np.random.default_rng(1)
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     between = 0
     for _ in range(40):
         windows = windows_of_short_motions(chance, 60)

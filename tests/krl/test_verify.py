@@ -1,21 +1,16 @@
 """What was changed in a written program is noticed, with its line; what is merely laid out anew is not."""
 
 import re
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-import gcode2krl
 from gcode2krl.cli.main import main
 from gcode2krl.errors import NotUnderstoodError
 from tests.cells import OWN_CELL
-from tests.krl.conftest import Made
+from tests.krl.conftest import Made, verified
 from tests.krl.replay import read_program
-
-# what is judged with forces is tried in tests/cli/test_verify_hazards.py
-verify_krl = partial(gcode2krl.verify_krl, forces=False)
 
 
 def line_of(lines, pattern, occurrence=0):
@@ -178,7 +173,7 @@ def made(shared):
 def test_tampering_is_noticed(made, name):
     edit, code = TAMPERINGS[name]
     line = tampered(made, edit)
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert not report.ok
     found = [issue for issue in errors(report) if code in (None, issue.code)]
     assert found, [issue.text() for issue in errors(report)]
@@ -205,7 +200,7 @@ def test_the_command_refuses_what_was_tampered_with(made, name, capsys):
 
 def test_untouched_program_verifies(make, capsys):
     made = make()
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert report.ok
     assert report.motions == report.intended == len(made.targets)
     assert report.max_deviation_mm <= 0.001
@@ -220,7 +215,7 @@ def test_truncated_file_is_noticed(make, share):
     made = make()
     data = made.src.read_bytes()
     made.src.write_bytes(data[: int(share * len(data))])
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert not report.ok
     assert "krl-structure" in {issue.code for issue in errors(report)}
 
@@ -230,26 +225,26 @@ def test_no_program_at_all(make, text):
     made = make()
     made.src.write_bytes(text)
     with pytest.raises(NotUnderstoodError, match="no-def"):
-        verify_krl(made.src, made.toolpath, made.cell)
+        verified(made.src, made.toolpath, made.cell)
 
 
 def test_program_of_another_part_is_noticed(make, tmp_path):
     made = make()
     other = make(stem="other", text=re.sub(r"X40\b", "X41", made.part.read_text()))
-    assert not verify_krl(other.src, made.toolpath, made.cell).ok
-    assert verify_krl(other.src, other.toolpath, made.cell).ok
+    assert not verified(other.src, made.toolpath, made.cell).ok
+    assert verified(other.src, other.toolpath, made.cell).ok
 
 
 def test_program_of_another_cell_is_noticed(make):
     made = make(data={"frames": {"base": {**OWN_CELL["frames"]["base"], "z_mm": 801.0}}})
     default = make(stem="usual")
-    assert not verify_krl(made.src, made.toolpath, default.cell).ok
+    assert not verified(made.src, made.toolpath, default.cell).ok
 
 
 def test_worst_lines_name_the_line_of_the_gcode(make):
     made = make()
     line = tampered(made, TAMPERINGS["X by 0.01 mm"][0])
-    worst = verify_krl(made.src, made.toolpath, made.cell).worst[0]
+    worst = verified(made.src, made.toolpath, made.cell).worst[0]
     assert worst["line"] == line
     assert worst["gcode_line"] == 10
     assert worst["deviation_mm"] == pytest.approx(0.01)
@@ -289,7 +284,7 @@ def test_equal_program_by_hand_verifies(make, name):
     rewritten = REWRITINGS[name](text)
     assert rewritten != text
     made.src.write_bytes(rewritten.encode("ascii"))
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert report.ok, [issue.text() for issue in errors(report)]
     assert report.motions == report.intended
 
@@ -317,7 +312,7 @@ def test_parts_of_a_long_program(make, tmp_path, split, most):
     folder.mkdir()
     parts = type(whole)(folder, ZIGZAG, "whole", {"program": {"max_lines": most}}, split=split)
     assert motions_of(parts.src) == motions_of(whole.src)
-    report = verify_krl(parts.src, parts.toolpath, parts.cell)
+    report = verified(parts.src, parts.toolpath, parts.cell)
     assert report.ok, [issue.text() for issue in errors(report)]
     assert report.motions == len(whole.targets)
     text = "".join(file.read_text("ascii") for file in folder.glob("*.src"))
@@ -341,17 +336,17 @@ def test_messages_in_parts_that_begin_in_a_blended_corner(make, tmp_path, split)
     made = make(part, data={"program": {"max_lines": 100}}, split=split)
     text = "".join(file.read_text("ascii") for file in tmp_path.rglob("*.src"))
     assert text.index('"nearly done"') > text.rindex("GK_PAR[1]={") > text.rindex("DECL KRLMSG_T")
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
     usual = make(part, stem="usual")
-    assert verify_krl(made.src, made.toolpath, usual.cell).ok, "how it is split is no difference"
+    assert verified(made.src, made.toolpath, usual.cell).ok, "how it is split is no difference"
 
 
 def test_each_verifies_with_the_cell_of_the_other(make, tmp_path):
     """How the text is laid out is no difference."""
     made = make(ZIGZAG, data={"program": {"max_lines": 100}})
     default = make(ZIGZAG, stem="usual")
-    assert verify_krl(made.src, made.toolpath, default.cell).ok
-    assert verify_krl(default.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, default.cell).ok
+    assert verified(default.src, made.toolpath, made.cell).ok
 
 
 @pytest.mark.parametrize("deed", ["missing", "swapped", "changed"])
@@ -372,7 +367,7 @@ def test_tampered_part_file_is_noticed(make, deed):
         line = line_of(lines, r"^LIN", 20)
         lines[line] = lines[line].replace("Z -1.000", "Z -1.010")
         second.write_text("\r\n".join(lines) + "\r\n", "ascii")
-    report = verify_krl(made.src, made.toolpath, made.cell)
+    report = verified(made.src, made.toolpath, made.cell)
     assert not report.ok
     if deed == "changed":
         found = [issue for issue in errors(report) if issue.code == "verify-position"]

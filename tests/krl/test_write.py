@@ -14,12 +14,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gcode2krl import set_targets, write_krl
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.krl import verify_krl
 from gcode2krl.krl.number_text import fixed, motion_lines
-from tests.cells import OWN_CELL, signed
-from tests.krl.conftest import PART, read
+from tests.cells import OWN_CELL, over_demonstration, signed
+from tests.krl.conftest import PART, read, verified
 from tests.krl.replay import components, frame
 
 
@@ -53,7 +51,7 @@ def test_name_from_the_file(make, stem, name):
     assert re.findall(r"(?m)^DEFDAT (\w+)", made.program.files[1].read_text("ascii")) == [name]
     codes = [issue.code for issue in made.program.issues if issue.code == "krl-name"]
     assert codes == ([] if name == stem.upper() else ["krl-name"])
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 @pytest.mark.parametrize("name", ["job_7", "JOB_7", "A" * 24, "_X"])
@@ -86,7 +84,7 @@ def test_parts_have_names_of_their_own(make, name, split):
     names = re.findall(r"(?m)^DEF (\w+)", text)
     assert len(names) == len(set(names)) > 3
     assert max(map(len, names)) <= 24
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_parts_of_two_programs_in_one_folder_do_not_collide(make):
@@ -95,7 +93,7 @@ def test_parts_of_two_programs_in_one_folder_do_not_collide(make):
     first = make(long_part(150), stem="HOUSING_LEFT_SIDE_OP10A", split="files", data=data)
     second = make(long_part(160), stem="HOUSING_LEFT_SIDE_OP10B", split="files", data=data)
     assert not set(first.program.files) & set(second.program.files)
-    assert verify_krl(first.src, first.toolpath, first.cell).ok
+    assert verified(first.src, first.toolpath, first.cell).ok
 
 
 def long_part(moves: int) -> str:
@@ -124,7 +122,7 @@ def test_every_byte_is_fit_for_the_controller(make, options):
     assert len(re.findall(rb"(?m)^END\r$", made.src.read_bytes())) == len(
         re.findall(rb"(?m)^DEF ", made.src.read_bytes())
     )
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_same_input_same_bytes(make):
@@ -169,11 +167,10 @@ def nth(method, n):
     return counted
 
 
-@pytest.mark.parametrize("call", [1, 2])
 @pytest.mark.parametrize(
     "victim", [(os, "fsync"), (Path, "replace"), (os, "fdopen"), (Path, "chmod")], ids=lambda v: v[1]
 )
-@pytest.mark.parametrize("split", ["defs", "files"])
+@pytest.mark.parametrize(("call", "split"), [(1, "defs"), (2, "files")])
 def test_full_disk_leaves_the_old_files(make, tmp_path, monkeypatch, victim, call, split):
     """All old or all new, whichever write the disk refuses."""
     data = {"program": {"max_lines": 100}}
@@ -244,7 +241,7 @@ def test_released_findings_stand_in_the_header(make):
         make(text)
     made = make(text, allow=["m-code-unmapped:11"])
     assert "; findings released by hand: m-code-unmapped:11\r\n" in text_of(made)
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_no_guard_is_recorded(make):
@@ -258,9 +255,9 @@ def test_no_guard_is_recorded(make):
 
 def test_program_without_guard_verifies_as_such(make):
     made = make(guard=False)
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
     made.src.write_bytes(made.src.read_bytes().replace(b"(--no-guard)", b"(        )"))
-    assert not verify_krl(made.src, made.toolpath, made.cell).ok
+    assert not verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_guard_stands_before_any_motion(make):
@@ -344,7 +341,7 @@ def test_external_subprograms_are_declared(make):
     made = make(data=data)
     text = text_of(made)
     assert text.index("EXT SPINDLE_ON(INT :IN)") < text.index(";FOLD INI") < text.index("SPINDLE_ON(8000)")
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_call_without_declaration_is_refused(make):
@@ -384,7 +381,7 @@ def test_template_with_an_error_is_refused(make, tmp_path, template):
 def test_template_of_any_form_verifies(make, template):
     """A template may begin with a wait: that is no dwell of the G-code."""
     made = make(PART.replace("G1 X40 F1500", "G1 X40 F1500\nM10"), data={"m_code": {"M10": template}})
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 @pytest.mark.parametrize("where", ["prologue", "epilogue"])
@@ -395,7 +392,7 @@ def test_prologue_and_epilogue(make, where, template):
     motions = [found.start() for found in re.finditer(r"(?m)^(PTP|LIN)", text)]
     at = text.rindex(template.split("\n")[0])
     assert at < motions[0] if where == "prologue" else at > motions[-1]
-    assert verify_krl(made.src, made.toolpath, made.cell).ok
+    assert verified(made.src, made.toolpath, made.cell).ok
 
 
 def test_long_program_warns_with_the_split(make):
@@ -512,7 +509,7 @@ def test_motion_lines_use_the_same_rule(rows, speed, cdis):
 
 
 def test_feed_is_exact_to_a_tenth_of_a_millimetre_a_minute(tmp_path):
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     for feed in (0.1, 7.3, 1234.5, 5999.9):
         toolpath = read(PART.replace("F1500", f"F{feed}"), cell)
         written = write_krl(set_targets(toolpath, cell), None, cell)

@@ -90,14 +90,14 @@ def exchange(wire, krc, cycles, steps=None):
 def test_a_session_over_udp_compensates_and_ends_when_the_peer_is_silent(cell, tmp_path):
     with running(cell, folder=tmp_path / "run") as (port, outcome):
         wire, krc = Wire(port), Krc(cell)
-        exchange(wire, krc, 300)
+        exchange(wire, krc, 200)
         assert krc.ready
         wire.socket.settimeout(2.5)
         with pytest.raises(TimeoutError):
             wire.socket.recv(10)
     session, statistics = outcome["end"]
     assert (session.phase, session.reason) == (Phase.CLOSED, "silence")
-    assert statistics.answered == statistics.telegrams == 300
+    assert statistics.answered == statistics.telegrams == 200
     assert abs(krc.applied[1]) > 0.5
     found = statistics.as_dict()
     assert 0.0 < found["answer_ms_median"] <= found["answer_ms_999"] <= found["answer_ms_worst"]

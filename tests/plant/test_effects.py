@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from tests.plant import arm, instruments, truth
+from tests.plant import instruments, truth
 from tests.plant.effects import LIBRARY, SLIPS, UNKNOWN, Draw
-from tests.plant.robot import SIGN, Run, fast, joint_torques, joints_for
-from tests.plant.scene import DEGREE, GEAR_RATIO, World
-from tests.plant.short import driven
+from tests.plant.robot import Run, fast, joints_for, simulate
+from tests.plant.scene import World
+from tests.plant.waypoints import PROGRAMS, Waypoints
 
 WORLD = World()
 ALL = {**LIBRARY, **SLIPS, **{f"open:{name}": kind for name, kind in UNKNOWN.items()}}
@@ -41,6 +41,19 @@ LATE = (
 FAR = dict.fromkeys(
     ("encoder_drop_out", "collision", "bolt_ratchet", "cable_jerks_free", "preload_jump"), "slots"
 )  # not to be seen on two rows
+
+
+def two_rows() -> Waypoints:
+    """The start of a program: dive, a row along y, a step, the row back."""
+    way = PROGRAMS["zigzag"]().waypoints()
+    cdis = way.cdis_mm[:7].copy()
+    cdis[-1] = 0.0
+    return Waypoints(way.position_mm[:7], way.speed_mm_s[:7], cdis, way.hold_s[:7], way.cutting[:7])
+
+
+def driven(hooks: dict, number: int = 0, program: str | None = None) -> Run:
+    way = two_rows() if program is None else PROGRAMS[program]().waypoints()
+    return simulate(way, WORLD, [hooks], age_s=3600.0, number=number)
 
 
 def middle(kind) -> float:
@@ -94,68 +107,12 @@ def only(name: str, size: float, target: str | None = None) -> Run:
     return driven(LIBRARY[name].same(Draw(1, target))[1](size)[1])
 
 
-def test_backlash_is_a_play_of_half_the_gap():
-    run = only("backlash", 0.02, "A2")
-    gap = (run.q_load - run.q_act) / DEGREE
-    assert np.abs(gap[:, 1]).max() == pytest.approx(0.01, rel=1e-9)
-    assert np.abs(np.delete(gap, 1, axis=1)).max() == 0.0
-    np.testing.assert_array_equal(run.q_act, run.q_cmd)
-
-
-def test_transmission_is_a_sine_of_the_motor_angle():
-    target, at = LIBRARY["transmission"].same(Draw(1, "A3"))
-    values, hooks = at(0.005)
-    run = driven(hooks)
-    wave = 0.005 * np.sin(values["harmonic"] * GEAR_RATIO[2] * run.q_act[:, 2] + values["phase"])
-    np.testing.assert_allclose((run.q_load - run.q_act)[:, 2] / DEGREE, wave, atol=1e-12)
-    assert target == "A3"
-
-
-def test_lag_is_seen_by_the_motor_encoder():
-    run = only("servo_lag", 0.02, "A1")
-    speed = run.rates(run.q_cmd)[:, 0]
-    behind = (run.q_cmd - run.q_act)[:, 0]
-    busy = slice(2500, 3500)  # in the middle of a row along y
-    np.testing.assert_allclose(behind[busy], 0.02 * speed[busy], atol=2e-3 * np.abs(speed).max() * 0.02)
-
-
-def test_nonlinear_stiffness_adds_its_law_to_the_angle():
-    values, hooks = LIBRARY["nonlinear_stiffness"].same(Draw(1, "A1"))[1](0.01)
-    run = driven(hooks)
-    torque = joint_torques(run)[:, 0] / 1000.0
-    np.testing.assert_allclose(run.extra_rad[:, 0], 0.01 * DEGREE * np.tanh(torque / values["torque_Nm"]))
-    plain_twist = torque * 1000.0 / WORLD.stiffness_Nmm_rad[0, 2]
-    np.testing.assert_allclose(run.twist_rad[:, 0], plain_twist + run.extra_rad[:, 0], atol=1e-15)
-    assert SIGN[0] == -1.0
-
-
-def test_stiffness_scales_the_bending():
-    base, soft = driven({}), only("stiffness", 0.5, "spindle")
-    assert np.abs(soft.bending_mm).max() > np.abs(base.bending_mm).max()
-
-
-def test_mastering_is_true_minus_indicated():
-    values, hooks = LIBRARY["mastering"].same(Draw(1, "A1"))[1](0.05)
-    run = driven(hooks)
-    expected = arm.pose(run.arm, run.q_load + np.array([values["offset_deg"] * DEGREE, 0, 0, 0, 0, 0]))[0]
-    np.testing.assert_allclose(
-        run.tip_mm - fast(run, run.bending_mm), expected - WORLD.base.origin_mm, atol=1e-9
-    )
-
-
 def test_clock_stamps_are_late_by_the_offset():
     run = driven({})
     run.clocks["tracker"] = (0.05, 1e-3)
     late = instruments.clean(run, EVERYTHING)["tracker"]
     true_s = (late["t_s"] - 0.05) / 1.001
     np.testing.assert_allclose(late["x_mm"], np.interp(true_s, run.t_s, run.tip_mm[:, 0]))
-
-
-def test_wear_grows_with_the_metres_cut():
-    base, worn = driven({}), only("tool_wear", 1.0)
-    cutting = np.abs(base.force_N[:, 0]) > 20.0
-    grown = (worn.force_N / np.where(base.force_N == 0.0, 1.0, base.force_N))[cutting, 0]
-    np.testing.assert_allclose(grown, 1.0 + base.metres_cut[cutting])
 
 
 def test_a_compensated_run_bends_less():

@@ -7,12 +7,12 @@ import re
 import numpy as np
 import pytest
 
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.prediction.limits import cycle_acceleration
 from gcode2krl.tables import Motion
 from gcode2krl.units import GRAVITY_M_S2
+from tests.cells import over_demonstration
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"
 SLOT = "G0 X0 Y0\nG0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\n"
@@ -21,7 +21,7 @@ STOCK = {"box_mm": [[-20, -20, -20], [80, 20, 0]], "resolution_mm": 0.5}
 
 def predicted(text=HEAD + SLOT, *, instead=None, **data):
     """``instead`` replaces sections by values that a cell file may not state."""
-    cell = resolve_cell({"based_on": "demonstration", "stock": STOCK, **data})
+    cell = over_demonstration({"stock": STOCK, **data})
     cell = cell.model_copy(update=instead(cell) if instead else {})
     toolpath = read_stream(io.BytesIO((text + "M5\nM30\n").encode()), "part.nc", cell)
     return predict_toolpath(toolpath, cell)

@@ -5,8 +5,8 @@ import io
 import pytest
 
 from gcode2krl import set_targets
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
+from tests.cells import over_demonstration
 
 
 class Plan:
@@ -14,7 +14,7 @@ class Plan:
 
     def __init__(self, text: str, data: dict, tolerance_mm: float | None):
         self.text = text
-        self.cell = resolve_cell({"based_on": "demonstration", **data})
+        self.cell = over_demonstration(data)
         self.toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", self.cell)
         self.targets = set_targets(self.toolpath, self.cell, tolerance_mm)
 

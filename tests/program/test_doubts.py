@@ -3,10 +3,10 @@
 import pytest
 
 from gcode2krl import load_cell, read_gcode
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.pipeline import predict_toolpath, set_targets
 from gcode2krl.program.doubts import doubtful
+from tests.cells import over_demonstration
 
 HEAD = ["G21 G90 G17", "T1 M6", "S9000 M3", "G0 G43 H1 Z30", "G0 X0 Y0", "G0 Z2", "G1 Z-5 F600"]
 TAIL = ["G0 Z30", "M5", "M30"]
@@ -15,7 +15,7 @@ TAIL = ["G0 Z30", "M5", "M30"]
 def warnings(tmp_path, body, code, data=None, tolerance_mm=None, head=HEAD):
     path = tmp_path / "part.nc"
     path.write_text("\n".join([*head, *body, *TAIL]) + "\n")
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     toolpath = read_gcode(path, cell)
     cuts = code == "feed-per-tooth"
     source = predict_toolpath(toolpath, cell) if cuts else set_targets(toolpath, cell, tolerance_mm)

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import plan_motion, set_targets
-from gcode2krl.cell import resolve_cell
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.krl.number_text import fixed
 from gcode2krl.program.merging import MOST_TURN_RAD, as_written, straightened
+from tests.cells import over_demonstration
 
-CELL = resolve_cell({"based_on": "demonstration"})
+CELL = over_demonstration()
 ROUNDED_MM = 0.00087
 """Half the diagonal of a cube of the last decimal."""
 
@@ -175,7 +175,7 @@ TAIL = "G0 Z20\nM5\nM30\n"
 
 
 def targets_of(body, simplify_mm=0.01, tolerance_mm=None, data=None):
-    cell = resolve_cell({"based_on": "demonstration", **(data or {})})
+    cell = over_demonstration(data)
     toolpath = read_stream(io.BytesIO(f"{HEAD}{body}{TAIL}".encode()), "part.nc", cell)
     return toolpath, set_targets(toolpath, cell, tolerance_mm, simplify_mm)
 

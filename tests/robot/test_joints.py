@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from gcode2krl import set_targets, solve_joints
-from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import read_stream
 from gcode2krl.robot import forward
+from tests.cells import over_demonstration
 from tests.krl.replay import Kr300, frame
 
 HEAD = "G21 G90 G54\nT1 M6\nS8000 M3\nG43 H1\n"
@@ -21,7 +21,7 @@ LOW, HIGH = Kr300.limits_deg.T
 
 def solve(text, **data):
     """Plan a piece of G-code in a cell and solve its joints."""
-    cell = resolve_cell({"based_on": "demonstration", **data})
+    cell = over_demonstration(data)
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", cell)
     targets = set_targets(toolpath, cell)
     joints = solve_joints(targets, cell)

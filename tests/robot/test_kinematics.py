@@ -137,7 +137,7 @@ class TestFlangePose:
 class TestAllBranches:
     @each_robot
     def test_independent_solver(self, geometry: FloatArray) -> None:
-        n = 10_000
+        n = 3_000
         position, rotation = flange_pose(random_angles(n, seed=1), geometry)
         mine = all_branches(position, rotation, geometry)
         a1, a2, c1, c2, c3, c4 = geometry
@@ -169,7 +169,7 @@ class TestAllBranches:
 
     @each_robot
     def test_forward_of_inverse_and_branch_is_status(self, geometry: FloatArray) -> None:
-        given_q = random_angles(20_000, seed=2)
+        given_q = random_angles(8_000, seed=2)
         position, rotation = flange_pose(given_q, geometry)
         q = all_branches(position, rotation, geometry)
         assert (np.isnan(q).any(axis=2) == np.isnan(q).all(axis=2)).all()

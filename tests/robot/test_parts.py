@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from gcode2krl import set_targets
-from gcode2krl.cell import resolve_cell
 from gcode2krl.compiled import chunks
 from gcode2krl.gcode import read_stream
 from gcode2krl.robot import findings, follow, follow_motion, forward, joints, lines, motion_angles
 from gcode2krl.robot.joints import target_angles
 from gcode2krl.robot.standing import limit_margin
 from gcode2krl.tables import Motion
+from tests.cells import over_demonstration
 
 HEAD = "G21 G90 G54\nT1 M6\nS8000 M3\nG43 H1\nG0 X0 Y0\nG0 Z5\nG1 Z0 F3000\n"
 TAIL = "G0 Z50\nM30\n"
 
 
 def program(points, **data):
-    cell = resolve_cell({"based_on": "demonstration", **data})
+    cell = over_demonstration(data)
     text = HEAD + "".join(f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f}\n" for x, y, z in points) + TAIL
     toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", cell)
     return set_targets(toolpath, cell), cell
@@ -96,7 +96,7 @@ def turning_wrist(count=200, turns=2.0):
 
 @pytest.mark.parametrize("rows", [1, 3, 30, 41, 90])
 def test_motion_with_winding_and_singular_wrist(rows_in_a_part, rows):
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     motion = moving(turning_wrist(), cell)
     rows_in_a_part(10**6)
     whole = follow_motion(motion, cell)
@@ -106,7 +106,7 @@ def test_motion_with_winding_and_singular_wrist(rows_in_a_part, rows):
 
 def test_the_angles_are_those_that_moved(rows_in_a_part):
     rows_in_a_part(16)
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     q = turning_wrist(turns=1.9)
     q[:, 4] = np.radians(30)
     found, speeds = motion_angles(moving(q, cell), cell)
@@ -117,7 +117,7 @@ def test_the_angles_are_those_that_moved(rows_in_a_part):
 
 def test_a_wrong_start_of_a_part_is_put_right(rows_in_a_part, monkeypatch):
     """The trial's joints are only a guess: parts that start a turn off are solved again."""
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     motion = moving(turning_wrist(), cell)
     rows_in_a_part(10**6)
     whole = follow_motion(motion, cell)
@@ -181,7 +181,7 @@ def test_spans_hold_the_beginnings_of_the_first_runs_of_each_kind(monkeypatch, g
 
 
 def test_margin_by_hand():
-    cell = resolve_cell({"based_on": "demonstration"})
+    cell = over_demonstration()
     low, high = np.radians(np.array(cell.robot.limits.q_deg)).T
     q = np.random.default_rng(3).uniform(low - 0.3, high + 0.3, (500, 6))
     expected = np.minimum(q - low, high - q).min(axis=1)

@@ -18,6 +18,7 @@ from gcode2krl.krl.read import read_krl
 from gcode2krl.prediction import Prediction
 from gcode2krl.runkit import make_kit
 from gcode2krl.runkit.accepted import read_program
+from gcode2krl.translation import Order, carry_out
 from tests.cells import over_demonstration
 from tests.cli.test_translate import CLEAN
 
@@ -39,13 +40,23 @@ def program(run, tmp_path):
     return tmp_path / "PART.src"
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The program, the folder of its kit, and the kit."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "part.nc").write_text(PART, encoding="ascii")
+    attempt = carry_out(Order(folder / "part.nc", output=folder / "PART.src"))
+    assert attempt.error is None
+    return folder / "PART.src", folder / "kit", make_kit(folder / "PART.src", folder / "kit", load_cell())
+
+
 def text_of(file):
     return file.read_text(encoding="utf-8")
 
 
-def test_the_variant_in_air_is_the_same_path_100_mm_higher(program, tmp_path):
-    make_kit(program, tmp_path / "kit", load_cell())
-    itself, air = read_krl(program), read_krl(tmp_path / "kit" / "PART_AIR.src")
+def test_the_variant_in_air_is_the_same_path_100_mm_higher(made):
+    program, folder, _ = made
+    itself, air = read_krl(program), read_krl(folder / "PART_AIR.src")
     assert len(air.ptp) == len(itself.ptp)
     lift = air.position_mm - itself.position_mm
     home = ~np.isnan(itself.q_deg).any(axis=1)
@@ -55,9 +66,9 @@ def test_the_variant_in_air_is_the_same_path_100_mm_higher(program, tmp_path):
     assert np.array_equal(air.q_deg[home], itself.q_deg[home])
 
 
-def test_it_switches_nothing_but_changes_the_tool_and_keeps_the_guard(program, tmp_path):
-    make_kit(program, tmp_path / "kit", load_cell())
-    itself, air = read_krl(program), read_krl(tmp_path / "kit" / "PART_AIR.src")
+def test_it_switches_nothing_but_changes_the_tool_and_keeps_the_guard(made):
+    program, folder, _ = made
+    itself, air = read_krl(program), read_krl(folder / "PART_AIR.src")
     assert not [s.text for s in air.statements if re.match(r"\$(AN)?OUT\[", s.text)]
     assert [s.text for s in itself.statements if re.match(r"\$(AN)?OUT\[", s.text)]
     assert len(air.triggers.line) == 0
@@ -68,36 +79,36 @@ def test_it_switches_nothing_but_changes_the_tool_and_keeps_the_guard(program, t
     assert any("$AXIS_ACT" in s.text for s in air.statements if s.motion == 2)
 
 
-def test_the_prediction_is_that_of_the_program_in_air(program, tmp_path):
-    kit = make_kit(program, tmp_path / "kit", load_cell())
-    prediction = Prediction.load(tmp_path / "kit" / "prediction")
-    air = read_krl(tmp_path / "kit" / "PART_AIR.src")
+def test_the_prediction_is_that_of_the_program_in_air(made):
+    _, folder, kit = made
+    prediction = Prediction.load(folder / "prediction")
+    air = read_krl(folder / "PART_AIR.src")
     assert prediction.motion.position_mm[:, 2].min() == pytest.approx(-2.0 + LIFT_MM, abs=0.01)
     lin = prediction.targets.position_mm[~prediction.targets.home]
     assert np.allclose(lin, air.position_mm[np.isnan(air.q_deg).all(axis=1)], atol=1e-9)
     assert kit.time_s == pytest.approx(float(prediction.motion.time_s[-1]), rel=1e-6)
-    table = pl.read_csv(tmp_path / "kit" / "prediction" / "motion.csv")
+    table = pl.read_csv(folder / "prediction" / "motion.csv")
     assert len(table) == len(prediction.motion)
 
 
-def test_the_recording_has_its_folder(program, tmp_path):
-    make_kit(program, tmp_path / "kit", load_cell())
-    head = tomllib.loads(text_of(tmp_path / "kit" / "run_air" / "run.toml"))
+def test_the_recording_has_its_folder(made):
+    _, folder, _ = made
+    head = tomllib.loads(text_of(folder / "run_air" / "run.toml"))
     assert (head["mode"], head["override_percent"]) == ("AUT", 100)
-    prediction = Prediction.load(tmp_path / "kit" / "prediction")
+    prediction = Prediction.load(folder / "prediction")
     motion, joints = prediction.motion, prediction.joints
     columns = {"t_s": motion.time_s}
     columns |= {f"{axis}_cmd_mm": motion.position_mm[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"q{k + 1}_cmd_deg": np.degrees(joints.q_rad[:, k]) for k in range(6)}
     columns |= {f"q{k + 1}_act_deg": np.degrees(joints.q_rad[:, k]) for k in range(6)}
-    pl.DataFrame(columns).write_csv(tmp_path / "kit" / "run_air" / "controller.csv")
-    recorded = load_run(tmp_path / "kit" / "run_air")
+    pl.DataFrame(columns).write_csv(folder / "run_air" / "controller.csv")
+    recorded = load_run(folder / "run_air")
     assert not [issue for issue in recorded.issues if issue.severity == "error"]
 
 
-def test_the_check_list_has_this_programs_values(program, tmp_path):
-    make_kit(program, tmp_path / "kit", load_cell())
-    page = text_of(tmp_path / "kit" / "checklist.html")
+def test_the_check_list_has_this_programs_values(made):
+    program, folder, _ = made
+    page = text_of(folder / "checklist.html")
     itself = read_krl(program)
     first = itself.position_mm[1]
     assert f"X {first[0]:.2f} Y {first[1]:.2f} Z {first[2]:.2f} mm in $BASE, a PTP from HOME" in page
@@ -114,9 +125,9 @@ def test_the_check_list_has_this_programs_values(program, tmp_path):
     assert "http" not in page.replace("http-equiv", "")  # one file, no network
 
 
-def test_the_check_list_says_what_to_look_at_in_this_program_alone(program, tmp_path):
-    make_kit(program, tmp_path / "kit", load_cell())
-    page = text_of(tmp_path / "kit" / "checklist.html")
+def test_the_check_list_says_what_to_look_at_in_this_program_alone(made):
+    program, folder, _ = made
+    page = text_of(folder / "checklist.html")
     header = ASSUMED.findall(text_of(program))
     looks = {each.look for each in all_constructs() if each.look}
     assert {look for look in looks if str(escape(look)) in page} == set(header) > set()
