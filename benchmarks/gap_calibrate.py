@@ -59,7 +59,7 @@ from gcode2krl.gap.posterior.calibrated import (
 from gcode2krl.gap.thresholds import TABLE, THRESHOLDS
 
 HEADS = (NAME, FAMILY, UNKNOWN, DEPENDENCE)
-CONVENTION_NATS = THRESHOLDS.choose.alike_chi2 / 2.0
+CONVENTION_NATS = THRESHOLDS.posterior.alike_chi2 / 2.0
 _HEAD = "| | rows | ECE | Brier | log score | right at p >= .9 | wrong at p >= .5 |\n| --- |" + " --- |" * 6
 
 
@@ -150,7 +150,7 @@ def _print_scores(
         print(f"| (seen) | {len(rows)} {scores_of(rows, own, head)}")
     cases = {row.case for row in of_head[NAME]}
     pairs = zip(of_head[NAME], unseen[NAME], strict=True)
-    wrong = {row.case for row, p in pairs if p >= THRESHOLDS.choose.named and not row.right[NAME]}
+    wrong = {row.case for row, p in pairs if p >= THRESHOLDS.posterior.named and not row.right[NAME]}
     print(
         f"\ncases with a cause: {len(cases)}, with a wrong name: {len(wrong)} "
         f"(<= {rate([case in wrong for case in cases]).upper:.3f})"

@@ -229,7 +229,7 @@ def scores_of(rows: Sequence[Row], p: Floats, head: str) -> Scores:
     right, weight = np.array([row.right[head] for row in rows], dtype=bool), weights_of(rows)
     place = np.minimum((p * _BINS).astype(int), _BINS - 1)
     off = [abs(float(weight[place == b] @ (p - right)[place == b])) for b in np.unique(place)]
-    sure, named = p >= 0.9, p >= THRESHOLDS.choose.named
+    sure, named = p >= 0.9, p >= THRESHOLDS.posterior.named
     return Scores(
         rows=len(p),
         ece=sum(off) / float(weight.sum()),

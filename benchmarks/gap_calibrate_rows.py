@@ -115,7 +115,7 @@ def with_set(cause: dict[str, Any], alike_nats: float) -> dict[str, Any]:
     """Return a cause with the set that this threshold declares."""
     behind = sorted(compared(cause), key=lambda each: each["behind_nats"])
     alike = [each for each in behind if each["behind_nats"] < alike_nats]
-    return cause | {"indistinguishable_from": alike[: THRESHOLDS.tell.most_alike]}
+    return cause | {"indistinguishable_from": alike[: THRESHOLDS.answer.most_alike]}
 
 
 def compared(cause: dict[str, Any]) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ from gcode2krl.gap.posterior.families import Evidence
 from gcode2krl.gap.posterior.selection import Rival
 from gcode2krl.gap.thresholds import THRESHOLDS, stated_table
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 MOST_NATS = 1000.0
 """Evidence beyond it says no more; also where there is nothing to compare with."""
 _DIGITS = 4

@@ -50,7 +50,7 @@ from gcode2krl.gap.posterior.least_squares import Fitted, Numbers, Shortened, ga
 from gcode2krl.gap.posterior.likelihood import Key, Likelihood, once_among
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _NORMAL_MAD = 1.4826
 """The standard deviation of a normal over its median absolute deviation."""
 _MAD_EFFICIENCY = 0.37
@@ -294,7 +294,7 @@ def _share_in_step(power: Floats, changes: Bools, components: int, apart: float)
     loudest = np.repeat(np.maximum.reduceat(power[loud], first), np.diff(first, append=len(loud)))
     in_step = np.logical_or.reduceat((power[loud] == loudest) & changes[loud], first)
     count = int(np.count_nonzero(in_step))
-    if count < THRESHOLDS.beside.in_step_least:
+    if count < THRESHOLDS.compare.in_step_least:
         return 0.0
     chance = components * bdtrc(count - 1, len(first), float(np.mean(changes)))
     here = loud[changes[loud]]
@@ -512,7 +512,7 @@ def _blocks(
         return
     residuals = [trace.residual for trace in traces]
     step_s = usual_step_s(traces[0].time_s)
-    peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)
+    peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.posterior.frequency_peaks)
     duration_s = float(traces[0].time_s[-1] - traces[0].time_s[0])
     yield from blocks_at(effect, target, peaks, (p.high - p.low) * duration_s)
 
