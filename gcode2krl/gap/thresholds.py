@@ -822,7 +822,7 @@ THRESHOLDS = Thresholds()
 
 
 TABLE = Path(__file__).with_name("probabilities.json")
-"""Written by ``benchmarks/gap_calibrate.py``."""
+"""Written by ``benchmarks/blind/calibrate.py``."""
 
 
 @cache

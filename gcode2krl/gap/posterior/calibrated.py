@@ -7,7 +7,7 @@ shows. Each term maps one or two of these numbers to a goodness u in 0 … 1, th
 
 is monotone in every test, also for effects and set-ups that the table has not seen: a better test never
 lowers a probability. It stays within 0.02 … 0.98. ``b`` and ``w`` stand in ``gap/probabilities.json``, which
-``benchmarks/gap_calibrate.py`` writes from cases of the independent plant with whole effects left out.
+``benchmarks/blind/calibrate.py`` writes from cases of the independent plant with whole effects left out.
 
 A name also needs the conditions of `FamilyTests` (its family is the best, its form fits, no other family
 takes a share beside it) and that its size is one number (`Constancy`). Where one of them fails the cause is
