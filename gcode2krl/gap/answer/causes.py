@@ -307,6 +307,7 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
         probability=family.probability,
+        place_probability=family.place_probability,
         share=family.features.share,
         tests=family.features.as_dict(),
         at_time_s=None if moment is None else moment[1],

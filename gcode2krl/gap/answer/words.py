@@ -591,7 +591,10 @@ def where_lines(gap: Gap) -> Iterator[str]:
 def left_lines(gap: Gap) -> Iterator[str]:
     """Yield on what depends what no named cause explains, the most probable first."""
     for dependence in gap.unexplained.depends_on[: _LIMITS.report_lines]:
-        yield f"{dependence.probability:.2f} {depends(dependence)}; takes {dependence.share:.0%} of the gap"
+        place = dependence.place_probability
+        aside = "" if place is None else f", the place alone {place:.2f}"
+        share = f"takes {dependence.share:.0%} of the gap"
+        yield f"{dependence.probability:.2f}{aside} {depends(dependence)}; {share}"
 
 
 def _link(link: LinkResult) -> str:

@@ -393,6 +393,8 @@ class FamilyProbability:
     evidence: Evidence
     features: FamilyFeatures
     probability: float
+    place_probability: float
+    """That its place is right, whatever the gap depends on there."""
 
 
 def family_probabilities(rest: Rest, larger_links: int = 0) -> list[FamilyProbability]:
@@ -416,7 +418,11 @@ def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbabil
     """Return a family of one component beside that of all, which is it where it has more evidence."""
     if told.evidence.place.component is None or told.evidence.nats > whole.evidence.nats:
         return told
-    return replace(told, probability=min(told.probability, 1.0 - whole.probability))
+    return replace(
+        told,
+        probability=min(told.probability, 1.0 - whole.probability),
+        place_probability=min(told.place_probability, 1.0 - whole.place_probability),
+    )
 
 
 def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:
@@ -427,10 +433,25 @@ def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[Fam
     behind = np.array([max(first.nats - each.nats, 0.0) / first.inflation for each in others])
     weights = np.exp(-behind / _LIMITS.temperature)
     shares = np.minimum((1.0 - own) * weights / (1.0 + weights.sum()), own)
+    there = [float(s) for s, each in zip(shares, others, strict=True) if each.place.name == first.place.name]
+    at_first = max(_of_place(own), clipped(own + sum(there)))  # one input at a place excludes another
     return [
-        FamilyProbability(first, features, own),
+        FamilyProbability(first, features, own, at_first),
         *(
-            FamilyProbability(each, family_features(rest, each, larger_links), float(share))
+            FamilyProbability(
+                each,
+                family_features(rest, each, larger_links),
+                float(share),
+                at_first
+                if each.place.name == first.place.name
+                else min(_of_place(float(share)), 1.0 - at_first),
+            )
             for each, share in zip(others, shares, strict=True)
         ),
     ]
+
+
+def _of_place(probability: float) -> float:
+    """Return the probability that a family's place is right: inputs at one place imitate each other."""
+    odds = _LIMITS.place_odds * probability / (1.0 - probability)
+    return clipped(odds / (1.0 + odds))
