@@ -72,8 +72,8 @@ def test_a_test_that_parts_right_from_wrong_gets_the_weight():
 
 
 def test_a_test_that_speaks_the_wrong_way_gets_none():
-    rows = [row("rival", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
-    assert dict(zip(TERMS, calibrate.fitted(rows, NAME).weights, strict=True))["rival"] == 0.0
+    rows = [row("shape", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
+    assert dict(zip(TERMS, calibrate.fitted(rows, NAME).weights, strict=True))["shape"] == 0.0
 
 
 def test_a_left_out_effect_teaches_nothing_about_itself():

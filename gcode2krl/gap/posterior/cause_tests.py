@@ -354,21 +354,13 @@ class FamilyTests:
 
     Slow noise hides the power of slow effects from chi2, so that a rest of a hundredth of the gap may take
     most of what can be told of it."""
-    other_p: float
-    """Of an evidence as large as that, if nothing admissible explains the rest."""
     family: Evidence | None
     """The best member of its own family."""
     better: Evidence | None
     """The best other family with the cause taken out."""
-    components: frozenset[int]
-    """Of the signal, which the cause moves."""
     family_behind: float | None = None
     """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
     None where its family says nothing."""
-
-    def is_near(self, evidence: Evidence) -> bool:
-        """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
-        return _is_in(self.components, evidence)
 
     @property
     def is_best(self) -> bool:
@@ -544,11 +536,9 @@ class LinkFamilies:
             form_ratio=form / max(form + own_rest, 1e-30),
             other_share=0.0 if other is None else min(net_gain(other) / max(gap_gain, 1e-30), 1.0),
             other_power=0.0 if other is None else self._power_share(other, number),
-            other_p=1.0 if other is None else study_of_rest.p_of(other),
             family=of_cause[0] if of_cause else None,
             family_behind=(form_nats - of_cause[0].nats) / of_cause[0].inflation if of_cause else None,
             better=better,
-            components=components,
         )
 
     def _components(self, number: int) -> frozenset[int]:

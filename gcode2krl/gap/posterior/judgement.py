@@ -552,11 +552,9 @@ def _causes(
             examination,
             number,
             tests=tests,
-            rest=every,
             gap_p=families.gap_p[order],
             constant=constant,
             parameters=intervals[number],
-            rivals=rivals,
             held_out=_held_out(examination, order, sizes, every, trials),
         )
         table = probabilities_table()
