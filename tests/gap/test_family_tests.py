@@ -151,6 +151,12 @@ def test_each_test_alone_forbids_the_name():
         assert not passes(worse)
 
 
+def test_geometry_is_exact():
+    """A form of wear may take nine tenths of what its kind takes; that of a frame takes all."""
+    assert FamilyTests(20.0, 0.9, 0.0, 0.0, None, None).form_fits
+    assert not FamilyTests(20.0, 0.998, 0.0, 0.0, None, None, least_form=1.0 - 0.03**2).form_fits
+
+
 def test_evidence_within_its_inflation_counts_for_nothing():
     strong, weak = c.stub(nats=30.0, inflation=2.0), c.stub(nats=30.0, inflation=20.0)
     assert net_gain(strong) == 60.0

@@ -361,6 +361,8 @@ class FamilyTests:
     family_behind: float | None = None
     """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
     None where its family says nothing."""
+    least_form: float = _LIMITS.form_ratio
+    """The share that its form has to take. Geometry is exact: that is off by no more than its numbers are."""
 
     @property
     def is_best(self) -> bool:
@@ -370,7 +372,7 @@ class FamilyTests:
     @property
     def form_fits(self) -> bool:
         """Tell whether its form takes nearly all that its family takes."""
-        return self.form_ratio >= _LIMITS.form_ratio
+        return self.form_ratio >= self.least_form
 
     @property
     def is_alone(self) -> bool:
@@ -538,6 +540,9 @@ class LinkFamilies:
             other_power=0.0 if other is None else self._power_share(other, number),
             family=of_cause[0] if of_cause else None,
             family_behind=(form_nats - of_cause[0].nats) / of_cause[0].inflation if of_cause else None,
+            least_form=1.0 - _LIMITS.model_error**2
+            if applied.effect.family == "geometry"
+            else _LIMITS.form_ratio,
             better=better,
         )
 
