@@ -34,7 +34,7 @@ _PROBABILITIES = """
 
 P = 1 / (1 + exp(-b - Σ w·u)) of the goodness u of each test, 0 at the worst and 1 at the best value here and
 beyond (`gcode2krl/gap/posterior/calibrated.py`; of two numbers the better one counts; of *unknown* the
-formula gives 1 - P). Weights and b are made by `benchmarks/gap_calibrate.py` from {cases}.
+formula gives 1 - P). Weights and b are made by `benchmarks/blind/calibrate.py` from {cases}.
 Sets that cannot be told apart reach to {alike_nats:g} nats. A gap for which no effect was accepted is outside
 the library with P = {unknown_without_cause:g}.
 

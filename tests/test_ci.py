@@ -9,7 +9,7 @@ SCRIPT = ROOT / ".ci" / "run"
 IN_TESTS = {
     "benchmarks/five_axis.py": "tests/cutting/test_turned.py",
     "benchmarks/mistakes.py": "tests/test_mistakes.py",
-    "benchmarks/gap_calibrate.py": "tests/benchmarks/test_gap_calibrate.py",
+    "benchmarks/blind/calibrate.py": "tests/benchmarks/test_gap_blind_calibrate.py",
     "benchmarks/blind/channels.py": "tests/benchmarks/test_gap_metamorphic.py",
     "benchmarks/online_faults.py": "tests/online/test_faults.py",
 }

@@ -174,6 +174,7 @@ class Said:
     on: str
     form: str | None
     probability: float
+    place_probability: float
 
 
 @dataclass(frozen=True)
@@ -193,21 +194,26 @@ NOTHING = Told(False, False, False)
 def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
     """Compare the most probable dependence that an answer states with those that the label allows.
 
-    A named cause states its own family; a dependence of the rest counts where nothing is named. None where
-    the label knows none.
+    A named cause states its own family; a dependence of the rest counts where nothing is named. Its place has
+    a probability of its own, and may be stated where the input is not. None where the label knows none.
     """
     allowed = allowed_by(entry)
     if allowed is None:
         return None
     stated = [*_of_causes(named_of(result))] or [*_of_rest(result)]
-    stated = [each for each in stated if each.probability >= STATED]
-    return _compared(max(stated, key=lambda each: each.probability), allowed) if stated else NOTHING
+    if not stated:
+        return NOTHING
+    best = max(stated, key=lambda each: each.probability)
+    if best.probability >= STATED:
+        return _compared(best, allowed)
+    best = max(stated, key=lambda each: each.place_probability)
+    return Told(best.place_probability >= STATED and best.at in allowed.at, False, False)
 
 
 def located(entries: Sequence[dict[str, Any]], result: dict[str, Any]) -> bool:
     """Tell whether each true effect has a statement of its own, of a cause or of the rest, with its place."""
     stated = [*_of_causes(named_of(result)), *_of_rest(result)]
-    places = [each.at for each in stated if each.probability >= STATED]
+    places = [each.at for each in stated if each.place_probability >= STATED]
     allowed = [allowed_by(entry) for entry in entries]
     return bool(allowed) and all(allowed) and _each_has_its_own([a.at for a in allowed if a], places)
 
@@ -250,14 +256,15 @@ def allowed_by(entry: dict[str, Any]) -> Allowed | None:
 
 def _of_rest(result: dict[str, Any]) -> Iterable[Said]:
     for each in result["unexplained"].get("depends_on") or ():
-        yield Said(each["at"], each["on"], each["form"], each["probability"])
+        place = each.get("place_probability") or each["probability"]  # an impulse has one for both
+        yield Said(each["at"], each["on"], each["form"], each["probability"], place)
 
 
 def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:
     for cause in causes:
         if cause.get("family"):
             at, _, on = cause["family"].partition(", ")
-            yield Said(at, TIME if on == STEP else on, None, cause["probability"])
+            yield Said(at, TIME if on == STEP else on, None, cause["probability"], cause["probability"])
 
 
 def _compared(said: Said, allowed: Allowed) -> Told:

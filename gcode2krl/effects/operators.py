@@ -39,6 +39,19 @@ def lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
     return out
 
 
+def delayed(values: Floats, time_s: Floats, delay_s: float) -> Floats:
+    """Return y(t) = x(t - delay) of the columns of (m, c), the ends held; x is a cubic between samples.
+
+    Its slopes are those of `lag`. Straight between samples, half a step of delay would bend corners as much as a
+    lag does.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    at_s = np.clip(time_s - delay_s, time_s[0], time_s[-1])
+    late: Floats = CubicHermiteSpline(time_s, values, np.gradient(values, time_s, axis=0))(at_s)
+    return late
+
+
 def second_order(values: Floats, time_s: Floats, hz: float, damping: float) -> Floats:
     """Return y'' + 2·zeta·w·y' + w²·y = w²·x for (m,), from rest at the first value.
 

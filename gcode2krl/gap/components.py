@@ -247,7 +247,7 @@ def unwritten(shape: tuple[int, int, int]) -> Floats:
     return np.zeros((k, c, n)).transpose(0, 2, 1)
 
 
-_LIMITS = THRESHOLDS.families
+_LIMITS = THRESHOLDS.components
 _VARIES = 1e-9
 """An input whose values differ by a smaller share is constant: there is no function of it but a constant."""
 

@@ -177,8 +177,8 @@ def _of_long_runs(shares: Mapping[str, float]) -> list[Issue]:
     """Return a note on the links of which a share of the rows alone was judged."""
     shortened = [f"{link} {share:.0%}" for link, share in shares.items() if share < 1.0]
     words = (
-        f"the runs are long: judged are evenly spread windows of {THRESHOLDS.beside.judged_window_s:g} s, of "
-        f"the rows of {', '.join(shortened)}; events are sought in all of them"
+        f"the runs are long: judged are evenly spread windows of {THRESHOLDS.compare.judged_window_s:g} s, "
+        f"of the rows of {', '.join(shortened)}; events are sought in all of them"
     )
     return [Issue("note", "run-long", 0, words)] if shortened else []
 

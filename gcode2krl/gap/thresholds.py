@@ -81,8 +81,8 @@ MODEL_RAD = 4e-4 * RAD_PER_DEG
 
 
 @dataclass(frozen=True)
-class BesideThresholds:
-    """When a run counts as the predicted one, and what of it is compared."""
+class CompareThresholds:
+    """When a run counts as the predicted one, what of it is compared, and when a set-up slip is said."""
 
     model_rad: float = physics(
         MODEL_RAD,
@@ -188,14 +188,6 @@ class BesideThresholds:
         1.0, "a spindle whose speed, or a multiple of it, is as near to the mains hides its hum"
     )
     hum_false: float = convention(1e-3, "chance that noise alone counts as a line of the mains")
-    frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
-    jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
-    jump_halves_s: tuple[float, ...] = convention(
-        (0.3, 1.0), "half of the windows in which a jump is looked for: quick motion, and noise"
-    )
-    least_jump: float = convention(
-        25.0, "log-likelihood ratio of a jump in its window; noise without memory shows one in 10,000 times"
-    )
 
     path_on_mm: float = physics(
         0.03, "right on the curve: the predicted path is right to 0.01 mm (docs/diagnose_check.md)"
@@ -281,26 +273,100 @@ class BesideThresholds:
     scan_inside_mm: float = convention(0.3, "a floor's point lies so far inside the cutter's edge")
     scan_smooth_s: float = convention(0.2, "the tracker's difference from the model is smoothed over this")
     scan_straight: float = convention(1e-6, "a tool axis that turns by less (rad) is one direction")
-    scan_outliers: float = convention(4.0, "robust deviations beyond which a point is left out")
-    scan_block_mm: float = convention(
-        20.0, "points of one block of the part share what the model of the tip is off by"
-    )
     scan_least_points: int = convention(30, "points of walls that are needed")
-    scan_certain: float = convention(4.0, "deviations beyond normal mismatch that make a gap")
-    scan_rough_mm: float = convention(1.0, "what is known of a radius or a floor beforehand")
-    scan_tip_mm: float = physics(0.003, "the swept surface is known to some micrometres")
-    scan_probability: float = convention(
-        0.95, "of a diameter that takes `scan_least_shrink` of the scan's gap, or more"
+
+    explained_share: float = calibrated(
+        0.9, DEVELOPMENT, "share of the gap's power that a slip, simulated again, must take"
     )
-    scan_probability_unsure: float = convention(0.4, "of one that takes less: it is not named")
-    scan_least_shrink: float = calibrated(
-        0.4, DEVELOPMENT, "share of the scan's gap on points not fitted to, from which a diameter is named"
+
+    override_off_percent: float = calibrated(
+        5.0, DEVELOPMENT, "an override nearer to 100 % is left to the time laws"
+    )
+    override_same_length: float = convention(
+        0.1, "relative; paths whose lengths differ by more are not compared by their times"
+    )
+    override_first_tries: tuple[float, ...] = convention(
+        (0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1), "times the override by the duration that are simulated first"
+    )
+    override_widths: tuple[float, ...] = convention(
+        (0.02, 0.008, 0.003, 0.001, 4e-4, 1.5e-4), "relative; widths of the search around the best so far"
+    )
+    still_rad_s: float = convention(1e-3, "joints that move slower are at rest")
+    still_mm_s: float = convention(1.0, "a tip that moves slower is at rest")
+    motion_step_s: float = convention(0.1, "speeds are taken over so long: no noise of encoders")
+
+    air_share: float = convention(
+        0.3,
+        "of the tip's error beside the predicted deflection, in each quarter of the cut: where less is left "
+        "without it, nothing was cut; an arm of twice the stiffness leaves as much either way",
+    )
+
+    force_unit_log: float = calibrated(
+        0.15, DEVELOPMENT, "a factor is that of a unit where its logarithm is so near"
+    )
+
+    stop_late_s: float = physics(
+        0.02, "an exact stop from a slow feed costs some hundredths of a second; time laws agree to 2 ms"
+    )
+    stop_dropped_delays: int = calibrated(
+        4,
+        DEVELOPMENT,
+        "up to this many of the smallest delays are dropped, one at a time: a last leg may only look late",
+    )
+    stop_most_corners: float = convention(
+        0.5, "where a larger share of the corners is late, it is the time law"
+    )
+    stop_as_good: float = convention(
+        1.1, "of the least rest: fewer stops that leave no more than this are named in place of more"
+    )
+    stop_explained_share: float = calibrated(
+        0.95, DEVELOPMENT, "share of the gap's power that planned stops must take"
+    )
+    stop_hold_steps: int = convention(4, "steps in which the time of standing is found")
+    stop_hold_settled_s: float = convention(1e-3, "a smaller step ends them")
+
+    program_on_share: float = calibrated(
+        0.1, WITH_ONCE_SCORED, "share of its way that an edited program keeps to the predicted curve"
+    )
+    program_off_way_mm: float = calibrated(
+        30.0, WITH_ONCE_SCORED, "a stretch beside the curve that is no corner is longer"
+    )
+    corner_blend_mm: float = physics(
+        50.0, "largest approximation distance in KUKA's examples (see the effect `corner`)"
+    )
+    program_frame_steps: int = convention(8, "steps that bring a path onto the curve as a whole")
+    program_frame_share: float = calibrated(
+        0.95, WITH_ONCE_SCORED, "share of the way that one frame brings onto the curve where it is a frame"
+    )
+    program_frame_rows: int = convention(4000, "samples of the path that this is tried with")
+    program_corner_rows: int = convention(200, "samples of a stretch that are tried for corners")
+
+    feed_same_curve: float = convention(0.9, "share of the way on the curve from which speeds are compared")
+    feed_same_length: float = convention(0.02, "lengths that differ by more are other paths")
+    feed_constant: float = convention(0.02, "relative; a speed that changes by less is constant")
+    feed_least_s: float = convention(0.05, "shorter stretches of constant speed are not timed")
+    feed_edge_share: float = convention(
+        0.2, "left out at each end of a stretch: the middle three fifths are timed"
+    )
+    feed_other: float = calibrated(
+        0.05, WITH_ONCE_SCORED, "relative; feeds that differ more from rapids are another program's"
+    )
+    feed_consistent: float = calibrated(
+        0.03, WITH_ONCE_SCORED, "relative; larger scatter of the feeds' ratios says nothing"
     )
 
 
 @dataclass(frozen=True)
-class FitThresholds:
-    """What is known of an effect's numbers and of the noise before the data are looked at."""
+class NoiseThresholds:
+    """What is known of noise before the data are looked at."""
+
+    jumps: int = convention(3, "moments at which an effect that begins at a moment is tried")
+    jump_halves_s: tuple[float, ...] = convention(
+        (0.3, 1.0), "half of the windows in which a jump is looked for: quick motion, and noise"
+    )
+    least_jump: float = convention(
+        25.0, "log-likelihood ratio of a jump in its window; noise without memory shows one in 10,000 times"
+    )
 
     # Noise
     noise_order: int = convention(3, "of the autoregressive model: a drift and an oscillation")
@@ -319,12 +385,6 @@ class FitThresholds:
     )
 
     poses_least_again: int = convention(8, "readings of poses visited again from which they tell the noise")
-    poses_mostly_frames: float = convention(
-        3.0, "a gap of poses this many times the arm's own errors is one of base and tool, which are effects"
-    )
-    poses_geometry_share: float = convention(
-        0.8, "of the error at places left out, what may be left for the geometry to be a cause"
-    )
     poses_chance: float = convention(
         0.01, "that one of all signatures explains so much of too few poses by chance: then it is no noise"
     )
@@ -334,20 +394,12 @@ class FitThresholds:
         1e-3, "chance that a line of noise alone counts as a tone, by an exponential distribution of power"
     )
 
-    # Nuisance
-    same_form: float = convention(
-        0.98, "share of a nuisance's power that an effect spans: both are then one deviation, judged as one"
-    )
-
     # The slow part of noise
     noise_block_s: float = physics(
         0.05, "blocks of the slow part: half of the shortest memory that counts as slow, 0.1 s"
     )
     noise_most_slow: float = convention(
         2.0, "times the short part's rms: an instrument that wanders by more is a finding, not noise"
-    )
-    noise_wander_share: float = convention(
-        0.2, "of the run that moves most, which each run moves at least: what one run does alone is an event"
     )
     noise_slow_gain: float = convention(
         6.0, "twice the log likelihood that a slow part must bring to be in the model"
@@ -372,6 +424,52 @@ class FitThresholds:
         0.02, "share of an input's power that mismatch leaves, or it explains nothing of its own"
     )
 
+
+@dataclass(frozen=True)
+class ComponentsThresholds:
+    """The functions that families are made of."""
+
+    knots: int = convention(12, "of functions of one input, over its range in all runs")
+    lengths: tuple[float, ...] = convention(
+        (1.0, 3.0, 9.0), "correlation lengths that are tried, in distances of knots"
+    )
+    harmonics: int = physics(4, "of a motor's turn: eccentricity, the two teeth of a wave, and theirs")
+
+
+@dataclass(frozen=True)
+class PosteriorThresholds:
+    """What is known of effects before the data are looked at, and when one is accepted, named or refused."""
+
+    frequency_peaks: int = convention(4, "peaks of a spectrum at which a tone is tried")
+    scan_outliers: float = convention(4.0, "robust deviations beyond which a point is left out")
+    scan_block_mm: float = convention(
+        20.0, "points of one block of the part share what the model of the tip is off by"
+    )
+    scan_certain: float = convention(4.0, "deviations beyond normal mismatch that make a gap")
+    scan_rough_mm: float = convention(1.0, "what is known of a radius or a floor beforehand")
+    scan_tip_mm: float = physics(0.003, "the swept surface is known to some micrometres")
+    scan_probability: float = convention(
+        0.95, "of a diameter that takes `scan_least_shrink` of the scan's gap, or more"
+    )
+    scan_probability_unsure: float = convention(0.4, "of one that takes less: it is not named")
+    scan_least_shrink: float = calibrated(
+        0.4, DEVELOPMENT, "share of the scan's gap on points not fitted to, from which a diameter is named"
+    )
+    poses_mostly_frames: float = convention(
+        3.0, "a gap of poses this many times the arm's own errors is one of base and tool, which are effects"
+    )
+    poses_geometry_share: float = convention(
+        0.8, "of the error at places left out, what may be left for the geometry to be a cause"
+    )
+
+    # Nuisance
+    same_form: float = convention(
+        0.98, "share of a nuisance's power that an effect spans: both are then one deviation, judged as one"
+    )
+    noise_wander_share: float = convention(
+        0.2, "of the run that moves most, which each run moves at least: what one run does alone is an event"
+    )
+
     # Numbers of effects
     prior_sizes: float = convention(3.0, "the standard deviation of a size's prior, in typical sizes")
     shape_span: float = convention(
@@ -384,25 +482,15 @@ class FitThresholds:
         9.2, "twice log 100, prior odds: slips are gross, and what is slight is another effect; as chi2"
     )
 
-
-@dataclass(frozen=True)
-class FamilyThresholds:
-    """What functions are tried, and when a family forbids a name."""
-
     # Functions
     rows_hz: float = physics(
         50.0, "rows are averaged down to no less than this rate: modes of an arm end at 25 Hz"
-    )
-    knots: int = convention(12, "of functions of one input, over its range in all runs")
-    lengths: tuple[float, ...] = convention(
-        (1.0, 3.0, 9.0), "correlation lengths that are tried, in distances of knots"
     )
     amplitudes: tuple[float, ...] = convention(
         (0.1, 0.4, 1.6, 6.4, 25.6, 102.4), "amplitudes that are tried, in rms of the noise"
     )
     step_s: float = convention(0.5, "between moments at which a step is tried; then a tenth around the best")
     tone_least_hz: float = convention(0.2, "a slower tone is a drift of a short run")
-    harmonics: int = physics(4, "of a motor's turn: eccentricity, the two teeth of a wave, and theirs")
 
     # Null
     flips: int = convention(200, "random signs of stretches: p of half a percent can be told")
@@ -464,14 +552,6 @@ class FamilyThresholds:
         "the same of what each run has over time, which fits any input of a slow motion: smooth loops of a "
         "torque were behind it by 0.05",
     )
-
-    # The answer
-    least_probability: float = convention(0.05, "a less probable family is not listed")
-
-
-@dataclass(frozen=True)
-class ChooseThresholds:
-    """When an effect is accepted and named, and how sure its numbers are."""
 
     # Candidates
     false_alarms: float = convention(
@@ -598,6 +678,12 @@ class ChooseThresholds:
     )
     most_twins: int = convention(3, "of those that are refitted beside an effect, the nearest first")
     rival_gain: float = calibrated(15.0, DEVELOPMENT, "a rival within this gain of the cause is refitted")
+    place_odds: float = calibrated(
+        7.0,
+        ONCE_SCORED,
+        "times the odds that a family is right, those that its place is: of 75 families below .3 the place "
+        "of 34 was right, of 191 above that of 180",
+    )
     least_unknown: float = convention(0.02, "no probability is nearer to 0 or 1: nothing is certain")
 
     # Naming
@@ -640,18 +726,6 @@ class ChooseThresholds:
         0.25, "between values of a program that count as independent; noise forgets within it or counts less"
     )
     trial_rows: int = convention(400, "values of a program at most, so that long ones do not win by length")
-
-
-@dataclass(frozen=True)
-class SlipThresholds:
-    """When a set-up slip is looked for, and when it is said."""
-
-    explained_share: float = calibrated(
-        0.9, DEVELOPMENT, "share of the gap's power that a slip, simulated again, must take"
-    )
-    probability: float = convention(
-        0.95, "stated for a slip that explains that much of a gap that machines do not have by themselves"
-    )
     path_off_rad: float = physics(
         3e-3, "a commanded path further off, 5 mm at an arm's length, cannot be caused by a servo or a gear"
     )
@@ -664,86 +738,16 @@ class SlipThresholds:
     )
     frame_fit_steps: int = convention(3, "Gauss-Newton steps of another base and the clock")
 
-    override_off_percent: float = calibrated(
-        5.0, DEVELOPMENT, "an override nearer to 100 % is left to the time laws"
-    )
-    override_same_length: float = convention(
-        0.1, "relative; paths whose lengths differ by more are not compared by their times"
-    )
-    override_first_tries: tuple[float, ...] = convention(
-        (0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1), "times the override by the duration that are simulated first"
-    )
-    override_widths: tuple[float, ...] = convention(
-        (0.02, 0.008, 0.003, 0.001, 4e-4, 1.5e-4), "relative; widths of the search around the best so far"
-    )
-    still_rad_s: float = convention(1e-3, "joints that move slower are at rest")
-    still_mm_s: float = convention(1.0, "a tip that moves slower is at rest")
-    motion_step_s: float = convention(0.1, "speeds are taken over so long: no noise of encoders")
-
-    air_share: float = convention(
-        0.3,
-        "of the tip's error beside the predicted deflection, in each quarter of the cut: where less is left "
-        "without it, nothing was cut; an arm of twice the stiffness leaves as much either way",
-    )
-
-    force_unit_log: float = calibrated(
-        0.15, DEVELOPMENT, "a factor is that of a unit where its logarithm is so near"
-    )
-
-    stop_late_s: float = physics(
-        0.02, "an exact stop from a slow feed costs some hundredths of a second; time laws agree to 2 ms"
-    )
-    stop_dropped_delays: int = calibrated(
-        4,
-        DEVELOPMENT,
-        "up to this many of the smallest delays are dropped, one at a time: a last leg may only look late",
-    )
-    stop_most_corners: float = convention(
-        0.5, "where a larger share of the corners is late, it is the time law"
-    )
-    stop_as_good: float = convention(
-        1.1, "of the least rest: fewer stops that leave no more than this are named in place of more"
-    )
-    stop_explained_share: float = calibrated(
-        0.95, DEVELOPMENT, "share of the gap's power that planned stops must take"
-    )
-    stop_hold_steps: int = convention(4, "steps in which the time of standing is found")
-    stop_hold_settled_s: float = convention(1e-3, "a smaller step ends them")
-
-    program_on_share: float = calibrated(
-        0.1, WITH_ONCE_SCORED, "share of its way that an edited program keeps to the predicted curve"
-    )
-    program_off_way_mm: float = calibrated(
-        30.0, WITH_ONCE_SCORED, "a stretch beside the curve that is no corner is longer"
-    )
-    corner_blend_mm: float = physics(
-        50.0, "largest approximation distance in KUKA's examples (see the effect `corner`)"
-    )
-    program_frame_steps: int = convention(8, "steps that bring a path onto the curve as a whole")
-    program_frame_share: float = calibrated(
-        0.95, WITH_ONCE_SCORED, "share of the way that one frame brings onto the curve where it is a frame"
-    )
-    program_frame_rows: int = convention(4000, "samples of the path that this is tried with")
-    program_corner_rows: int = convention(200, "samples of a stretch that are tried for corners")
-
-    feed_same_curve: float = convention(0.9, "share of the way on the curve from which speeds are compared")
-    feed_same_length: float = convention(0.02, "lengths that differ by more are other paths")
-    feed_constant: float = convention(0.02, "relative; a speed that changes by less is constant")
-    feed_least_s: float = convention(0.05, "shorter stretches of constant speed are not timed")
-    feed_edge_share: float = convention(
-        0.2, "left out at each end of a stretch: the middle three fifths are timed"
-    )
-    feed_other: float = calibrated(
-        0.05, WITH_ONCE_SCORED, "relative; feeds that differ more from rapids are another program's"
-    )
-    feed_consistent: float = calibrated(
-        0.03, WITH_ONCE_SCORED, "relative; larger scatter of the feeds' ratios says nothing"
-    )
-
 
 @dataclass(frozen=True)
-class TellThresholds:
+class AnswerThresholds:
     """What of an answer is said."""
+
+    # The answer
+    least_probability: float = convention(0.05, "a less probable family is not listed")
+    slip_probability: float = convention(
+        0.95, "stated for a slip that explains that much of a gap that machines do not have by themselves"
+    )
 
     most_letters: int = convention(240, "of the first sentence in the short form of an answer")
     most_shown: int = convention(12, "causes that a notebook lists")
@@ -813,19 +817,18 @@ class TellThresholds:
 class Thresholds:
     """Every number that decides an answer, by the room that uses it."""
 
-    beside: BesideThresholds = field(default_factory=BesideThresholds)
-    fit: FitThresholds = field(default_factory=FitThresholds)
-    families: FamilyThresholds = field(default_factory=FamilyThresholds)
-    choose: ChooseThresholds = field(default_factory=ChooseThresholds)
-    slips: SlipThresholds = field(default_factory=SlipThresholds)
-    tell: TellThresholds = field(default_factory=TellThresholds)
+    compare: CompareThresholds = field(default_factory=CompareThresholds)
+    noise: NoiseThresholds = field(default_factory=NoiseThresholds)
+    components: ComponentsThresholds = field(default_factory=ComponentsThresholds)
+    posterior: PosteriorThresholds = field(default_factory=PosteriorThresholds)
+    answer: AnswerThresholds = field(default_factory=AnswerThresholds)
 
 
 THRESHOLDS = Thresholds()
 
 
 TABLE = Path(__file__).with_name("probabilities.json")
-"""Written by ``benchmarks/gap_calibrate.py``."""
+"""Written by ``benchmarks/blind/calibrate.py``."""
 
 
 @cache

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from gcode2krl.effects.operators import lag, play, second_order, since_reversal
+from gcode2krl.effects.operators import delayed, lag, play, second_order, since_reversal
 
 T = np.arange(500) * 0.012
 
@@ -126,3 +126,17 @@ def test_noise_is_no_reversal():
     direction, since = since_reversal(np.full(50, 0.3), T[:50])
     assert not direction.any()
     assert np.isinf(since).all()
+
+
+@pytest.mark.parametrize("delay_s", [0.001, 0.0019, 0.0183])
+def test_a_delay_bends_a_sine_less_than_a_lag_does(delay_s):
+    t = np.arange(0.0, 4.0, 0.004)
+    late = delayed(np.sin(2.0 * np.pi * t)[:, None], t, delay_s)[:, 0]
+    exact = np.sin(2.0 * np.pi * (t - delay_s))
+    assert np.abs(late - exact)[10:].max() < 2e-6
+    assert np.abs(lag(np.sin(2.0 * np.pi * t), t, delay_s) - exact)[10:].max() > 1e-5
+
+
+def test_what_is_delayed_rests_before():
+    t = np.arange(0.0, 1.0, 0.004)
+    assert delayed((3.0 + t)[:, None], t, 0.1)[:25] == pytest.approx(3.0, abs=1e-12)

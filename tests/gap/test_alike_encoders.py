@@ -6,7 +6,7 @@ import pytest
 from gcode2krl.gap.noise.short import Slow, drawn_slow
 from gcode2krl.gap.noise.source import noise_of
 from gcode2krl.gap.posterior.examination import size_of_gap
-from tests.gap.constructed import noise, trace
+from tests.gap.constructed import STEP_S, motion, noise, trace
 
 COUNT, SIGMA = 2000, 2e-4
 
@@ -75,3 +75,19 @@ def test_heavy_tails_of_all_joints_and_a_spike_in_one_run_are_none():
         )
     )
     assert spike.loud_in_step == 0.0
+
+
+def faster_is_louder(share):
+    """Noise of one joint with so much more deviation at its highest speed than where it stands."""
+
+    def added(number, count):
+        speed = np.abs(np.gradient(motion(STEP_S * count).q_cmd_rad[:, 3]))
+        return {3: share * SIGMA * speed / speed.max() * noise(count, 70 + number, 1.0, 1)[:, 0]}
+
+    return added
+
+
+def test_an_encoder_that_is_louder_while_its_joint_turns_fast_shows_a_gap():
+    assert gap_of(faster_is_louder(1.2)).loud_in_step > 0.25
+    assert gap_of(faster_is_louder(0.0)).loud_in_step == 0.0
+    assert gap_of(wander(range(6))).loud_in_step == 0.0

@@ -42,7 +42,7 @@ def test_rivals_are_alike_or_have_a_probability():
     alike = [(_rival(f"mastering:target=A{n},offset_deg=1", True), 0.1) for n in range(1, 7)]
     found = cause_of(_cause([*alike, (_rival("base_frame:x_mm=1", False), 0.2)]), JUDGEMENT, "gear")
     assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}", 1.0) for n in range(1, 6))
-    assert len(found.indistinguishable_from) == THRESHOLDS.tell.most_alike
+    assert len(found.indistinguishable_from) == THRESHOLDS.answer.most_alike
     assert found.rivals == (RivalResult("base_frame", None, 0.2, 20.0),)
 
 

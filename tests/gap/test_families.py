@@ -29,7 +29,7 @@ from gcode2krl.gap.posterior.families import (
 )
 from gcode2krl.gap.posterior.gram import MOST
 from gcode2krl.gap.posterior.study import studies
-from gcode2krl.gap.thresholds import FamilyThresholds
+from gcode2krl.gap.thresholds import PosteriorThresholds
 from tests.gap import constructed as c
 
 COUNT = 500
@@ -283,7 +283,7 @@ def test_one_component_alone_has_its_own_rows():
 
 
 def test_amplitudes_reach_from_a_tenth_of_the_noise_to_a_hundred_times_it():
-    limits = FamilyThresholds()
+    limits = PosteriorThresholds()
     assert AMPLITUDES.tolist() == list(limits.amplitudes) == sorted(limits.amplitudes)
     assert AMPLITUDES[0] <= 0.1
     assert AMPLITUDES[-1] >= 100.0

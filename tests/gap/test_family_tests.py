@@ -94,7 +94,6 @@ def test_another_family_beside_the_effect_forbids_its_name():
     found = first_tests(lambda run, t: 3.0 * speed(t) + 1.5 * (t > 5.0), dragging, runs=1)
     assert not found.is_alone
     assert found.other_share > 0.1
-    assert found.other_p < 0.05
 
 
 def test_what_is_left_in_another_joint_does_not_speak_against_a_cause():
@@ -127,9 +126,6 @@ def test_of_an_effect_in_no_joint_alone_only_the_joints_that_it_moves_are_near()
     ]
     found = c.examined(made, [coupling])
     (tests,) = LinkFamilies(found, made).tests
-    assert tests.components == {0}
-    rest = LinkFamilies(found, made).rest.study.evidences
-    assert {each.place.name for each in rest if tests.is_near(each)} == {"A1"}
     assert tests.is_alone
 
 
@@ -142,17 +138,23 @@ def test_an_effect_that_states_no_family_is_its_own():
 
 
 def test_each_test_alone_forbids_the_name():
-    good = FamilyTests(20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset())
+    good = FamilyTests(20.0, 0.99, 0.0, 0.0, None, None)
     # most of what can be told, a hundredth of the gap
-    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, 0.005, None, None, frozenset())
+    hidden = FamilyTests(20.0, 0.99, 0.7, 0.01, None, None)
     assert passes(hidden)
     assert passes(good)
     for worse in (
-        FamilyTests(-20.0, 0.99, 0.0, 0.0, 1.0, None, None, frozenset()),
-        FamilyTests(20.0, 0.7, 0.0, 0.0, 1.0, None, None, frozenset()),
-        FamilyTests(20.0, 0.99, 0.2, 0.1, 0.005, None, None, frozenset()),
+        FamilyTests(-20.0, 0.99, 0.0, 0.0, None, None),
+        FamilyTests(20.0, 0.7, 0.0, 0.0, None, None),
+        FamilyTests(20.0, 0.99, 0.2, 0.1, None, None),
     ):
         assert not passes(worse)
+
+
+def test_geometry_is_exact():
+    """A form of wear may take nine tenths of what its kind takes; that of a frame takes all."""
+    assert FamilyTests(20.0, 0.9, 0.0, 0.0, None, None).form_fits
+    assert not FamilyTests(20.0, 0.998, 0.0, 0.0, None, None, least_form=1.0 - 0.03**2).form_fits
 
 
 def test_evidence_within_its_inflation_counts_for_nothing():

@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl.gap.answer.causes import cause_of
 from gcode2krl.gap.answer.result import plain
-from gcode2krl.gap.posterior.calibrated import MOST_NATS, NAMES, FamilyFeatures, Features, family_features
+from gcode2krl.gap.posterior.calibrated import NAMES, FamilyFeatures, Features, family_features
 from gcode2krl.gap.posterior.judgement import judge
 from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
@@ -36,9 +36,7 @@ def test_a_right_cause_has_good_tests():
     assert found.fold_agreement == 1.0
     assert found.shrink_of_rest > 0.95
     assert found.shrink_where_others == 1.0  # nothing is above it
-    assert (found.share_left, found.rest_share, found.conditions_failed) == (0.0, 0.0, 0)
-    assert (found.causes, found.alike) == (1, 0)
-    assert found.rival_nats == MOST_NATS  # there is no other effect
+    assert (found.share_left, found.conditions_failed, found.causes) == (0.0, 0, 1)
     assert found.inconstancy < 0.1
     # a sine of 2 sigma has an rms of √2 in values of one sigma
     assert found.size_over_noise == pytest.approx(2.0**0.5, rel=0.25)
@@ -57,12 +55,6 @@ def test_a_size_that_differs_from_run_to_run_is_inconstant():
     found = features([1.0 * y, 3.0 * y])
     assert found.inconstancy > 0.2
     assert found.constant_p < 1e-3
-
-
-def test_a_twin_counts_as_alike_and_not_as_a_rival():
-    found = features([2.0 * EFFECT.form(TIME_S)] * 2, effects=(EFFECT, wave(2.0, "twin")))
-    assert found.alike == 1
-    assert found.rival_nats == MOST_NATS
 
 
 def test_the_object_names_every_test_and_rounds_to_four_digits():

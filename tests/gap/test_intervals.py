@@ -29,7 +29,7 @@ def test_runs_of_any_length_share_no_stretch(seconds):
     runs = [run_of(seconds), run_of(30, components=3), run_of(seconds)]
     numbers = np.split(stretches_of_all(runs), np.cumsum([run.shape[0] * run.shape[1] for run in runs])[:-1])
     distinct = [set(each.tolist()) for each in numbers]
-    count = min(seconds, THRESHOLDS.beside.stretches_most)
+    count = min(seconds, THRESHOLDS.compare.stretches_most)
     assert [len(each) for each in distinct] == [count, 30, count]
     assert len(set.union(*distinct)) == 2 * count + 30
 
@@ -62,12 +62,12 @@ def test_an_interval_does_not_shrink_because_runs_are_long():
     one = np.ones(1)
     free = SimpleNamespace(names=("x",), low=-9.0 * one, high=9.0 * one, scale=one, applied=lambda x: x)
     fitted = Fitted((np.zeros(1),), 0.0, Numbers((free,)), np.zeros(1), np.zeros((1, 1)))
-    information = 4_000.0 + THRESHOLDS.fit.prior_sizes**-2
+    information = 4_000.0 + THRESHOLDS.posterior.prior_sizes**-2
     sizes = np.unique(likelihood.clusters, return_counts=True)[
         1
     ]  # a stretch of a run is a cluster of its own
     expected = np.sum((30.0 * sizes) ** 2) * len(sizes) / (len(sizes) - 1) / information**2
-    assert len(sizes) == 2 * THRESHOLDS.beside.stretches_most
+    assert len(sizes) == 2 * THRESHOLDS.compare.stretches_most
     assert covariance_of(likelihood, fitted)[0, 0] == pytest.approx(expected, rel=1e-9)
 
 

@@ -28,7 +28,7 @@ from gcode2krl.gap.posterior.least_squares import (
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-PRIOR = THRESHOLDS.fit.prior_sizes
+PRIOR = THRESHOLDS.posterior.prior_sizes
 NOISE = (
     Noise(np.array([0.6, -0.2, 0.1]), 0.5, 0.7),
     Noise(np.array([0.3, 0.25, -0.15]), 1.3, 1.5, (Slow(0.9, 0.8),)),

@@ -57,3 +57,12 @@ def test_a_signal_with_little_of_the_gap_is_less_certain():
     loud, quiet = (next(each for each in found if each.evidence.place.name == at) for at in ("A1", "A2"))
     assert quiet.features.of_largest == pytest.approx(quiet.evidence.nats / loud.evidence.nats, rel=1e-6)
     assert quiet.probability < loud.probability
+
+
+def test_a_place_is_at_least_as_probable_as_its_families_and_excludes_other_places():
+    found = told([STEP, 2.0 * np.sin(2.0 * np.pi * 5.3 * TIME_S)])
+    for name in ("A1", "A2"):
+        there = [each for each in found if each.evidence.place.name == name]
+        assert len({each.place_probability for each in there}) == 1
+        assert there[0].place_probability >= min(sum(each.probability for each in there), 0.98)
+        assert there[0].place_probability > there[0].probability

@@ -42,7 +42,7 @@ def test_the_clearest_jump_comes_first_beside_a_trend_and_a_tone():
     one = trace(noisy() + slow + at(310, 0.3) + at(120, 0.2), "mechanics")
     found = strongest_moments([one], 0.0, 1e6)
     np.testing.assert_allclose(found[:2], [one.time_s[310], one.time_s[120]], atol=1e-9)
-    assert len(found) <= THRESHOLDS.beside.jumps
+    assert len(found) <= THRESHOLDS.noise.jumps
 
 
 def test_noise_and_slow_motion_have_no_jump():

@@ -78,7 +78,7 @@ def test_what_turns_back_with_the_robot_is_no_noise():
     draw = np.random.default_rng(1)
     late = np.linspace(0.2, 1.0, COUNT)
     rest = [draw.standard_normal(COUNT) + 4.0 * late * command(number)[:, 0] for number in range(RUNS)]
-    assert command_p(rest) <= THRESHOLDS.families.gap_p
+    assert command_p(rest) <= THRESHOLDS.posterior.gap_p
     assert command_p(rest, Dependence.TRAVEL) == 1.0
 
 
@@ -87,5 +87,5 @@ def test_noise_with_a_memory_and_bursts_does_not_know_the_command():
     for seed in range(400):
         draw = np.random.default_rng(seed)
         found.append(command_p([wander(draw) for _ in range(RUNS)]))
-    assert sum(p <= THRESHOLDS.families.gap_p for p in found) <= 3
+    assert sum(p <= THRESHOLDS.posterior.gap_p for p in found) <= 3
     assert sum(p < 1.0 for p in found) > 20

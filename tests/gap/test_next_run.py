@@ -29,7 +29,6 @@ from tests.gap.constructed import LINK, cell, noise, question, stub, trace
 from tests.gap.test_separation import ALONG_X, SIGMA_MM, TRIALS, at, measured
 
 KNOWN = library()
-LIMITS = THRESHOLDS.choose
 
 
 def cause(found, probability, *rivals, **intervals):
@@ -56,7 +55,7 @@ def judgement(
         size=size,
         told=size,
         factor=1.0,
-        applied=tuple(each.applied for each in causes if each.probability >= LIMITS.named),
+        applied=tuple(each.applied for each in causes if each.probability >= THRESHOLDS.posterior.named),
         every=tuple(runs or found.traces),
         impulses=impulses,
         rest=None,
@@ -243,7 +242,7 @@ def test_what_is_asked_first_of_a_gap_is_never_what_the_runs_already_show(offset
     assert [each.answer for each in found.expect] == asked
     assert len({each.shows for each in found.expect}) == len(asked)
     assert [(each.first, each.second) for each in found.separates] == list(pairwise(asked))
-    assert found.separates[0].odds == pytest.approx(math.exp(LIMITS.most_log_odds), rel=0.01)
+    assert found.separates[0].odds == pytest.approx(math.exp(THRESHOLDS.posterior.most_log_odds), rel=0.01)
 
 
 def test_a_blow_is_run_again_only_where_no_other_run_is_of_its_program(offset):

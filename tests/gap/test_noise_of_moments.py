@@ -45,5 +45,5 @@ def test_two_loud_moments_are_a_coincidence():
     power = np.ones(MOMENTS)
     power[[100, 500]] = 50.0
     changes = np.isin(np.arange(MOMENTS), [100, 500])
-    assert THRESHOLDS.beside.in_step_least > 2
+    assert THRESHOLDS.compare.in_step_least > 2
     assert _share_in_step(power, changes, 1, APART) == 0.0

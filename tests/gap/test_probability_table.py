@@ -12,4 +12,4 @@ def test_the_table_stands_beside_the_thresholds():
 
 def test_declared_sets_are_as_wide_as_the_table_says_and_no_narrower_than_the_convention():
     assert declared_nats() == stated_table()["alike_nats"]
-    assert declared_nats() >= THRESHOLDS.choose.alike_chi2 / 2.0
+    assert declared_nats() >= THRESHOLDS.posterior.alike_chi2 / 2.0

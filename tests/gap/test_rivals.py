@@ -7,7 +7,6 @@ from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 from tests.gap.constructed import Added, applied, examined, motion, noise, trace, wave
 
-LIMITS = THRESHOLDS.choose
 SIGMA = 1e-4
 ALIKE, TEMPERATURE = 2.0 * declared_nats(), 3.0
 """As differences of chi2; what these are divided by."""
@@ -53,7 +52,7 @@ def test_alike_is_by_chi2_or_by_the_cost_of_numbers(worse, apart, alike):
 
 
 def test_the_declared_set_is_never_smaller_than_the_convention():
-    assert declared_nats() >= LIMITS.alike_chi2 / 2.0
+    assert declared_nats() >= THRESHOLDS.posterior.alike_chi2 / 2.0
 
 
 def with_rivals(effects, y, seed=1):

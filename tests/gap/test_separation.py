@@ -120,7 +120,7 @@ def test_an_answer_is_moved_where_the_runs_have_shown_it_least():
     information = information_of(found, 0, own)
     known = np.diag(information)
     drawn = allowed_by(information, own, found.traces[0])
-    assert len(drawn) == 2 * THRESHOLDS.choose.widest_ways
+    assert len(drawn) == 2 * THRESHOLDS.posterior.widest_ways
     names = free_of(own, found.traces[0]).names
     moved = [max(abs(each[name] - own[name]) for each in drawn) for name in names]
     most, least = names[int(np.argmin(known))], names[int(np.argmax(known))]

@@ -48,7 +48,7 @@ def test_the_best_leaves_least_and_what_cannot_be_simulated_is_left_out():
 
 @pytest.mark.parametrize("beyond", [-1e-3, 1e-3])
 def test_a_slip_takes_nine_tenths_of_the_power(beyond):
-    left = np.sqrt(1.0 - THRESHOLDS.slips.explained_share) * np.sqrt(12.5) * (1.0 + beyond)
+    left = np.sqrt(1.0 - THRESHOLDS.compare.explained_share) * np.sqrt(12.5) * (1.0 + beyond)
     slips = slip_if_explained([KnownTrace()], _taking(0.7), left, "words")
     assert len(slips) == (beyond < 0.0)
     for slip in slips:

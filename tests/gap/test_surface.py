@@ -15,7 +15,7 @@ from gcode2krl.gap.posterior.judgement import Judged
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.synthetic import LIBRARY, applied
 
-LEAST = THRESHOLDS.beside.scan_least_shrink
+LEAST = THRESHOLDS.posterior.scan_least_shrink
 (LARGER,) = applied("tool_diameter:offset_mm=0.2")
 
 

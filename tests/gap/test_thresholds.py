@@ -10,8 +10,8 @@ import pytest
 from gcode2krl.gap.thresholds import (
     ONCE_SCORED,
     THRESHOLDS,
+    CompareThresholds,
     Kind,
-    SlipThresholds,
     Threshold,
     Thresholds,
     convention,
@@ -39,14 +39,14 @@ def test_a_threshold_has_a_kind_a_reason_and_seeds_where_it_was_calibrated(thres
 
 def test_the_table_is_frozen() -> None:
     with pytest.raises(FrozenInstanceError):
-        setattr(THRESHOLDS.slips, "explained_share", 0.5)  # noqa: B010 (mypy refuses the assignment itself)
+        setattr(THRESHOLDS.compare, "explained_share", 0.5)  # noqa: B010 (mypy refuses the assignment itself)
 
 
 def test_another_value_keeps_its_reason() -> None:
-    stricter = Thresholds(slips=SlipThresholds(explained_share=0.99))
+    stricter = Thresholds(compare=CompareThresholds(explained_share=0.99))
     (found,) = [each for each in listed(stricter) if each.name == "explained_share"]
     (usual,) = [each for each in ALL if each.name == "explained_share"]
-    assert (found.value, found.reason, found.room) == (0.99, usual.reason, "slips")
+    assert (found.value, found.reason, found.room) == (0.99, usual.reason, "compare")
 
 
 def test_a_number_without_a_reason_is_no_threshold() -> None:

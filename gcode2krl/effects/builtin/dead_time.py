@@ -5,7 +5,8 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.effect import Applied, Effect, every_joint_and_all
-from gcode2krl.effects.inputs import Inputs, resampled
+from gcode2krl.effects.inputs import Inputs
+from gcode2krl.effects.operators import delayed
 from gcode2krl.effects.parameter import Parameter
 
 
@@ -42,7 +43,7 @@ class DeadTime(Effect):
         if applied["delay_s"] == 0.0:
             return q_act_rad
         q, axes = np.array(q_act_rad), list(applied.axes)
-        q[:, axes] = resampled(q[:, axes], inputs.time_s, inputs.time_s - applied["delay_s"])
+        q[:, axes] = delayed(q[:, axes], inputs.time_s, applied["delay_s"])
         return q
 
 

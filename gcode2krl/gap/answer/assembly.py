@@ -165,7 +165,7 @@ def _is_timing(judgement: Judged) -> bool:
     """Tell whether the gap of a path is one of timing: most of it lies along the motion."""
     if not isinstance(judgement, Judgement) or not judgement.link.tells_time:
         return False
-    return judgement.verdict != "no_gap" and timing_share(judgement.traces) > THRESHOLDS.tell.timing_share
+    return judgement.verdict != "no_gap" and timing_share(judgement.traces) > THRESHOLDS.answer.timing_share
 
 
 def _links(judgements: Sequence[Judged], slips: Sequence[Slip]) -> Iterator[LinkResult]:

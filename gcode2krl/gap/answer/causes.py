@@ -83,7 +83,7 @@ def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] =
         indistinguishable_from=(
             *(
                 EffectAt(rival.applied.effect.name, rival.applied.target, rival.behind_nats)
-                for rival in alike[: THRESHOLDS.tell.most_alike]
+                for rival in alike[: THRESHOLDS.answer.most_alike]
             ),
             *_unknown(cause),
         ),
@@ -139,7 +139,7 @@ def slip_cause(slip: Slip) -> CauseResult:
         effect=slip.applied.effect.name,
         target=slip.applied.target,
         link=slip.link.name,
-        probability=THRESHOLDS.slips.probability,
+        probability=THRESHOLDS.answer.slip_probability,
         parameters={} if slip.final else _slip_intervals(slip),
         shrink=None,
         rms_after=slip.rms_after,
@@ -158,7 +158,7 @@ def _slip_intervals(slip: Slip) -> dict[str, Interval]:
     return intervals
 
 
-_LIMITS = THRESHOLDS.tell
+_LIMITS = THRESHOLDS.answer
 _IN_EACH_RUN = frozenset({Dependence.RUN_TIME})
 """Each run has a course of its own."""
 
@@ -254,7 +254,6 @@ def _along(name: str, unit: str, vectors: Floats) -> list[_Input]:
     return [(f"{name} along {axis}", unit, vectors[:, i]) for i, axis in enumerate(AXES)]
 
 
-_FAMILY_LIMITS = THRESHOLDS.families
 _FORMS = {
     Dependence.RUN_TIME_STEP: "step",
     Dependence.RUN_TIME: "drift",
@@ -281,7 +280,7 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[De
     if not (rest.worth_naming or rest.is_gap):
         return
     for family in family_probabilities(rest, larger_links):
-        if family.probability >= _FAMILY_LIMITS.least_probability:
+        if family.probability >= _LIMITS.least_probability:
             yield _result(judgement, family), family.evidence
 
 
@@ -308,6 +307,7 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         on=(Dependence.RUN_TIME if is_step else evidence.on).value,
         form=_FORMS.get(evidence.on, "smooth"),
         probability=family.probability,
+        place_probability=family.place_probability,
         share=family.features.share,
         tests=family.features.as_dict(),
         at_time_s=None if moment is None else moment[1],
@@ -444,7 +444,7 @@ def with_geometry(gap: Gap, without_arm: Gap, arm: ArmGeometry) -> Gap:
         effect=GEOMETRY,
         target=None,
         link=MECHANICS.name,
-        probability=THRESHOLDS.tell.geometry_probability,
+        probability=THRESHOLDS.answer.geometry_probability,
         parameters=parts,
         shrink=shrink,
         rms_after=arm.after_mm,
@@ -553,7 +553,7 @@ def issues_of(judgements: Sequence[Judgement]) -> Iterator[Issue]:
 
 
 def _above_stated(judgement: Judgement, noise: NoiseResult) -> Iterator[Issue]:
-    most = THRESHOLDS.fit.noise_most_stated
+    most = THRESHOLDS.noise.noise_most_stated
     if noise.stated is None or noise.short < 0.999 * most * noise.stated:
         return
     known, taken = (f"{number(each)} {judgement.link.unit}" for each in (noise.stated, noise.short))
@@ -687,7 +687,7 @@ def shown(apart: Apart, value: float, is_open: bool = False) -> str:
 
     ``is_open``: the runs do not say which way it goes.
     """
-    at_s, values_at_a_point = apart.time_s, REFERENCE_DWELL_S / THRESHOLDS.choose.trial_step_s
+    at_s, values_at_a_point = apart.time_s, REFERENCE_DWELL_S / THRESHOLDS.posterior.trial_step_s
     after = f"{at_s:.0f} s" if at_s < _LIMITS.minutes_from_s else f"{at_s / S_PER_MIN:.0f} min"
     if abs(value) < _LIMITS.seen_sigma * apart.noise / values_at_a_point**0.5:
         return f"nothing above the noise after {after}"

@@ -199,14 +199,14 @@ def residuals_of(judgement: Judgement) -> list[Residual]:
     residuals = []
     for trace, off, of_run, of_machine in zip(traces, residual, by_run, shared, strict=True):
         doing = trace.sample(with_named) - trace.sample(judgement.usual)
-        structured = smoothed(trace.time_s, off - of_run - of_machine, THRESHOLDS.tell.rest_smooth_s)
+        structured = smoothed(trace.time_s, off - of_run - of_machine, THRESHOLDS.answer.rest_smooth_s)
         shape = doing + structured if has_rest else doing
         after = off - of_run
         residuals.append(Residual(trace=trace, before=after + doing, after=after, shape=shape, noise=noise))
     return residuals
 
 
-def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.tell.smooth_s) -> Floats:
+def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.answer.smooth_s) -> Floats:
     """Return the mean of values (n,) or (n, k) over a time, that of fewer samples at the ends."""
     if values.ndim == 2:
         return np.stack([smoothed(time_s, column, over_s) for column in values.T], axis=1)

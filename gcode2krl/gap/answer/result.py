@@ -352,6 +352,8 @@ class DependsOnResult:
     """Of a drift or a smooth function, how it goes over its input."""
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`posterior.calibrated.FamilyFeatures`)."""
+    place_probability: float | None = None
+    """That its place is right, whatever the gap depends on there."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ from gcode2krl.gap.posterior.judgement import Judged, Judgement
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 PHASES = ("corner", "reversal", "entry", "exit", "cruise", "air")
-_LIMITS = THRESHOLDS.tell
+_LIMITS = THRESHOLDS.answer
 _NO_NOISE = float(np.finfo(np.float64).tiny)
 """Keeps a signal without noise from dividing by zero."""
 

@@ -28,7 +28,7 @@ from gcode2krl.gap.posterior.cause_tests import Interval
 from gcode2krl.gap.posterior.judgement import Judgement
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.tell
+_LIMITS = THRESHOLDS.answer
 AXES, FORCE_AXES = ("x", "y", "z"), ("fx", "fy", "fz")
 _UNITS = {
     name: name
@@ -287,7 +287,7 @@ def impulses_of(judgement: Judgement) -> Iterator[DependsOnResult]:
     impulses = sorted(events, key=lambda event: -event.power)
     power = sum(event.power for event in impulses)
     power += max(judgement.size.excess_before, 0.0) * judgement.size.rows
-    for event in impulses[: THRESHOLDS.tell.most_alike]:
+    for event in impulses[: THRESHOLDS.answer.most_alike]:
         off = event.change if event.whose is Whose.SLIP else event.peak
         length = float(np.linalg.norm(off))
         is_vector = len(event.peak) == 3 and not judgement.link.of_joints
@@ -296,7 +296,7 @@ def impulses_of(judgement: Judgement) -> Iterator[DependsOnResult]:
             at=_at(event, judgement),
             on=Dependence.RUN_TIME.value,
             form="step" if event.whose is Whose.SLIP else IMPULSE,
-            probability=THRESHOLDS.tell.impulse_probability,
+            probability=THRESHOLDS.answer.impulse_probability,
             share=event.power / max(power, 1e-300),
             at_time_s=event.at_s,
             run=event.run,
@@ -591,7 +591,10 @@ def where_lines(gap: Gap) -> Iterator[str]:
 def left_lines(gap: Gap) -> Iterator[str]:
     """Yield on what depends what no named cause explains, the most probable first."""
     for dependence in gap.unexplained.depends_on[: _LIMITS.report_lines]:
-        yield f"{dependence.probability:.2f} {depends(dependence)}; takes {dependence.share:.0%} of the gap"
+        place = dependence.place_probability
+        aside = "" if place is None else f", the place alone {place:.2f}"
+        share = f"takes {dependence.share:.0%} of the gap"
+        yield f"{dependence.probability:.2f}{aside} {depends(dependence)}; {share}"
 
 
 def _link(link: LinkResult) -> str:

@@ -25,7 +25,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller, Measured
 from gcode2krl.runs.matching import best_shift
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 
 
 def late_s(trace: Trace, residual: Floats) -> tuple[Floats, Bools]:

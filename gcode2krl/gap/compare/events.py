@@ -45,7 +45,7 @@ from gcode2krl.gap.compare.trace import Event, Span, Trace, Whose, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import RAD_PER_REV
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 _WEIGHTS = (1.0, -4.0, 6.0, -4.0, 1.0)
 _LEAST_WINDOW = 9
 """Rows, so that the differences around one jump are fewer than half of a window."""

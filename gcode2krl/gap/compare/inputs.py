@@ -25,7 +25,7 @@ from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import MM_PER_M
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 _WIDTHS_MM = (0.3, 0.6, 1.2, 2.5, 5.0)
 """Of roundings: approximation distances of milling programs."""
 _REACH_MM = 2.0

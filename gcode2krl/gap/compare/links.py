@@ -116,7 +116,7 @@ def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     return columns * sigma(mismatch.clock_s)
 
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 
 JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 
@@ -520,8 +520,8 @@ class MechanicsLink(Link):
     needs = "tracker.csv, absolute angles and a known robot"
     table = "tracker"
     sets_clocks = True
-    least_off = THRESHOLDS.beside.progress_off_mm
-    least_step = THRESHOLDS.beside.progress_step_mm
+    least_off = THRESHOLDS.compare.progress_off_mm
+    least_step = THRESHOLDS.compare.progress_step_mm
 
     def trace(self, pair: Pair, base: Sequence[Applied] = ()) -> Trace | None:
         """Return the tip, beside the model from the measured joints."""

@@ -44,7 +44,7 @@ from gcode2krl.runs import Controller, Measured, Poses, Run
 from gcode2krl.tables import Motion, Targets
 from gcode2krl.units import MM_PER_M, S_PER_H
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 _SAME_S, _SAME_MM = 1e-9, 1e-6
 """Rounding errors of a plan."""
 

@@ -35,7 +35,7 @@ from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import check_against
 from gcode2krl.units import DEG_PER_RAD
 
-_COMPARE_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +58,12 @@ class CommandedPath:
     @property
     def on_mm(self) -> float:
         """Return the distance up to which a sample is right on the curve."""
-        return max(_COMPARE_LIMITS.path_on_mm, _COMPARE_LIMITS.path_on_decimals * self.resolution_mm)
+        return max(_LIMITS.path_on_mm, _LIMITS.path_on_decimals * self.resolution_mm)
 
     @property
     def off_mm(self) -> float:
         """Return the distance above which a sample is off the curve."""
-        return max(_COMPARE_LIMITS.path_off_mm, _COMPARE_LIMITS.path_off_decimals * self.resolution_mm)
+        return max(_LIMITS.path_off_mm, _LIMITS.path_off_decimals * self.resolution_mm)
 
     def share(self, rows: Bools) -> float:
         """Return the share of the way that some samples (n,) stand for."""
@@ -92,7 +92,7 @@ def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:
     way_mm = 0.5 * (np.append(steps_mm, 0.0) + np.append(0.0, steps_mm))
     resolution_mm = _last_decimal_rad(table.q_cmd_rad) * _reach_mm(tip_mm, inputs)
     rows = np.arange(len(tip_mm))
-    rows = rows[way_mm > max(_COMPARE_LIMITS.path_still_mm, resolution_mm)]
+    rows = rows[way_mm > max(_LIMITS.path_still_mm, resolution_mm)]
     rows = rows[_of_the_program(tip_mm[rows], apart_mm[rows], inputs)]
     if len(rows) < 2:
         return None
@@ -122,10 +122,10 @@ def _nearest_tool(q_rad: Floats, inputs: Inputs, tool: int | None) -> tuple[Floa
 def _last_decimal_rad(q_rad: Floats) -> float:
     """Return the unit of the last decimal of degrees in which angles (n, 6) are stated."""
     q_deg = q_rad * DEG_PER_RAD
-    for decimals in range(_COMPARE_LIMITS.log_most_decimals):
+    for decimals in range(_LIMITS.log_most_decimals):
         if np.abs(q_deg - np.round(q_deg, decimals)).max() < 0.01 * 10.0**-decimals:
             return float(10.0**-decimals / DEG_PER_RAD)
-    return float(10.0**-_COMPARE_LIMITS.log_most_decimals / DEG_PER_RAD)
+    return float(10.0**-_LIMITS.log_most_decimals / DEG_PER_RAD)
 
 
 def _reach_mm(tip_mm: Floats, inputs: Inputs) -> float:
@@ -136,11 +136,11 @@ def _reach_mm(tip_mm: Floats, inputs: Inputs) -> float:
 
 def _of_the_program(tip_mm: Floats, apart_mm: Floats, inputs: Inputs) -> Bools:
     """Return which samples (n,) are neither on the way to the program's start nor after its end."""
-    on = np.flatnonzero(apart_mm <= _COMPARE_LIMITS.path_off_mm)
+    on = np.flatnonzero(apart_mm <= _LIMITS.path_off_mm)
     inside = np.ones(len(tip_mm), dtype=np.bool_)
     if len(on):
         inside[: on[0]] = False
-        ended = np.linalg.norm(tip_mm - inputs.position_mm[-1], axis=1) <= _COMPARE_LIMITS.path_off_mm
+        ended = np.linalg.norm(tip_mm - inputs.position_mm[-1], axis=1) <= _LIMITS.path_off_mm
         if ended.any():
             inside[np.flatnonzero(ended)[-1] + 1 :] = False
     return inside
@@ -153,7 +153,7 @@ class Curve:
         steps = np.linalg.norm(np.diff(position_mm, axis=0), axis=1)
         moving = np.concatenate([[True], steps > 0.0])
         points, gone = position_mm[moving], np.concatenate([[0.0], np.cumsum(steps[moving[1:]])])
-        spacing = max(_COMPARE_LIMITS.curve_spacing_mm, gone[-1] / _COMPARE_LIMITS.curve_most_points)
+        spacing = max(_LIMITS.curve_spacing_mm, gone[-1] / _LIMITS.curve_most_points)
         at = np.union1d(gone, np.arange(0.0, gone[-1], spacing))
         self.points = np.stack([np.interp(at, gone, column) for column in points.T], axis=1)
         self.tree = cKDTree(self.points)
@@ -161,7 +161,7 @@ class Curve:
     def foot(self, tip_mm: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the curve's points nearest to points (n, 3), distances (n,) and directions (n, 3)."""
         last = len(self.points) - 1
-        _, near = self.tree.query(tip_mm, k=min(_COMPARE_LIMITS.curve_neighbours, last + 1))
+        _, near = self.tree.query(tip_mm, k=min(_LIMITS.curve_neighbours, last + 1))
         near = near.reshape(len(tip_mm), -1)
         first = np.clip(np.concatenate([near - 1, near], axis=1), 0, max(last - 1, 0))
         start = self.points[first]
@@ -188,7 +188,7 @@ def on_the_curve(pair: Pair, frame: Floats | None = None, tool: int | None = Non
     _, apart_mm, _ = Curve(pair.inputs.position_mm).foot(tip_mm)
     inside = _of_the_program(tip_mm, apart_mm, pair.inputs)
     on_mm = float(path.way_mm[inside & (apart_mm <= path.on_mm)].sum())
-    return on_mm > _COMPARE_LIMITS.path_mostly * float(path.way_mm[inside].sum())
+    return on_mm > _LIMITS.path_mostly * float(path.way_mm[inside].sum())
 
 
 Alike = tuple[tuple[str, str | None], ...]
@@ -215,7 +215,7 @@ def motion_traces(pairs: Sequence[Pair]) -> list[Trace]:
     """Return what shows how far the runs have come: their joints, or without any their tips."""
     joints = [trace for pair in pairs if (trace := PATH.motion(pair)) is not None]
     return [
-        trace for trace in joints if len(trace.time_s) >= THRESHOLDS.beside.trace_least_rows
+        trace for trace in joints if len(trace.time_s) >= THRESHOLDS.compare.trace_least_rows
     ] or MECHANICS.traces(pairs)
 
 
@@ -245,7 +245,7 @@ def best_of(traces: Sequence[Trace], candidates: Sequence[Applied]) -> tuple[App
 def slip_if_explained(traces: Sequence[Trace], applied: Applied, after: float, words: str) -> list[Slip]:
     """Return the slip where it takes nine tenths of the gap's power; ``after`` is the rms that it leaves."""
     before = rms_before(traces)
-    if after**2 > (1.0 - THRESHOLDS.slips.explained_share) * before**2:
+    if after**2 > (1.0 - THRESHOLDS.compare.explained_share) * before**2:
         return []
     trace = traces[0]
     factor = trace.factor
@@ -334,14 +334,11 @@ def force_unit_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> lis
     power = sum(float(np.sum(trace.nominal**2)) for trace in traces)
     factor = max(sum(float(np.sum(trace.nominal * trace.measured)) for trace in traces) / power, 1e-12)
     unit = min(_UNITS, key=lambda known: abs(log(factor / known)))
-    if abs(log(factor / unit)) > THRESHOLDS.slips.force_unit_log:
+    if abs(log(factor / unit)) > THRESHOLDS.compare.force_unit_log:
         return []
     applied = Applied(effect, "force", {"factor": unit})
     words = f"force.csv is {unit:g} times the predicted force: {_UNITS[unit]} in place of newtons"
     return slip_if_explained(traces, applied, rms_left(traces, applied), words)
-
-
-_LIMITS = THRESHOLDS.slips
 
 
 def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
@@ -382,7 +379,7 @@ def _is_nearer(pair: Pair, in_air: Pair) -> bool:
     cutting, air = traces[0].residual[rows], bare[0].residual[bare_rows]
     bent_mm = np.linalg.norm(traces[0].nominal[rows] - bare[0].nominal[bare_rows], axis=1)
     is_bent = bent_mm > 0.5 * bent_mm.max(initial=0.0)
-    if is_bent.sum() < THRESHOLDS.beside.trace_least_rows:
+    if is_bent.sum() < THRESHOLDS.compare.trace_least_rows:
         return False
     quarters = zip(np.array_split(cutting[is_bent], 4), np.array_split(air[is_bent], 4), strict=True)
     return all(rms_length([own]) < _LIMITS.air_share * rms_length([other]) for other, own in quarters)

@@ -31,7 +31,7 @@ from gcode2krl.gap.compare.interpolation import (
 from gcode2krl.gap.compare.pair import Pair, Simulator
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.beside
+_LIMITS = THRESHOLDS.compare
 Span = tuple[float, float]
 """Start and end in s of the table's stamps."""
 
@@ -347,7 +347,7 @@ class Trace:
         return turned
 
 
-STRETCH_S = THRESHOLDS.beside.stretch_s
+STRETCH_S = THRESHOLDS.compare.stretch_s
 
 
 def stretches_of(trace: Trace) -> Ints:
@@ -356,7 +356,7 @@ def stretches_of(trace: Trace) -> Ints:
     Of a long run they are longer, so that what is kept of each does not grow with it.
     """
     since_s = trace.time_s - trace.inputs.time_s[0]
-    longest_s = (float(since_s[-1]) + 1e-6) / THRESHOLDS.beside.stretches_most
+    longest_s = (float(since_s[-1]) + 1e-6) / THRESHOLDS.compare.stretches_most
     lasts_s = max(STRETCH_S, longest_s)
     number: Ints = (since_s / lasts_s).astype(np.int64)
     return number

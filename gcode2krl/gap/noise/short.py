@@ -98,7 +98,7 @@ def _stationary(transition: Floats, scale: float) -> Floats:
     return np.asarray(np.linalg.solve(system, driven), dtype=np.float64).reshape(count, count)
 
 
-_LIMITS = THRESHOLDS.fit
+_LIMITS = THRESHOLDS.noise
 _SETTLED = 500
 """Rows after which nothing is left of a start, with the largest pole allowed."""
 _MOST_SETTLING = 4000

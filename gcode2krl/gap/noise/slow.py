@@ -128,7 +128,7 @@ def _waves(tables: Sequence[Floats], count: int) -> list[Floats]:
     return [np.cos(each[:, :, None] * orders).reshape(len(each), -1) for each in scaled]
 
 
-_LIMITS = THRESHOLDS.fit
+_LIMITS = THRESHOLDS.noise
 _TIME_CONSTANTS_S = (0.1, 0.17, 0.3, 0.55, 1.0, 1.7, 3.0)
 _RATIOS = tuple(float(x) for x in 10.0 ** np.arange(-1.0, 3.01, 0.25))
 """ρ, the variance of the slow part over that of a block's mean of the short one."""

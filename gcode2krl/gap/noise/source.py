@@ -37,7 +37,7 @@ from gcode2krl.gap.noise.slow import SlowPart, block_means, slow_parts_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_H
 
-_LIMITS = THRESHOLDS.fit
+_LIMITS = THRESHOLDS.noise
 _RIDGE, _HATS_RIDGE = 1e-6, 1e-9
 """Keep columns apart that are equal to rounding; of unit length each, or per row."""
 _LEAST_RMS = 1e-9
@@ -446,7 +446,6 @@ def _basis(columns: Floats) -> Floats:
     return vectors[:, singular > _RANK * singular.max(initial=0.0)]
 
 
-_COMPARE_LIMITS = THRESHOLDS.beside
 _SMOOTH = 3
 """Degree of the polynomial that stands for whatever else goes on in a window."""
 _ROUNDING = 1e-12
@@ -458,13 +457,13 @@ def strongest_moments(traces: Sequence[Trace], low_s: float, high_s: float) -> t
     jumps_of_runs = [
         (jump, trace.inputs.hours * S_PER_H + float(trace.time_s[row]), half_s)
         for trace in traces
-        for half_s in _COMPARE_LIMITS.jump_halves_s
+        for half_s in _LIMITS.jump_halves_s
         for row, jump in _peaks(trace, half_s)
     ]
     moments: list[float] = []
     for _, at_s, half_s in sorted(jumps_of_runs, reverse=True):
         apart = all(abs(at_s - other) > half_s for other in moments)
-        if apart and low_s <= at_s <= high_s and len(moments) < _COMPARE_LIMITS.jumps:
+        if apart and low_s <= at_s <= high_s and len(moments) < _LIMITS.jumps:
             moments.append(at_s)
     return tuple(moments)
 
@@ -478,7 +477,7 @@ def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
     clear = np.sum([jumps(column, half) for column in _without_clock(trace).T], axis=0)
     peaks: list[tuple[int, float]] = []
     for row in np.argsort(-clear):
-        if clear[row] < _COMPARE_LIMITS.least_jump or len(peaks) == _COMPARE_LIMITS.jumps:
+        if clear[row] < _LIMITS.least_jump or len(peaks) == _LIMITS.jumps:
             break
         if all(abs(row - other) > half for other, _ in peaks):
             peaks.append((int(row), float(clear[row])))

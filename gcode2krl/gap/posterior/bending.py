@@ -23,7 +23,7 @@ from gcode2krl.gap.posterior.judgement import Judgement
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _SURE = 3.0
 """Standard deviations."""
 

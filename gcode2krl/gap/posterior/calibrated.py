@@ -7,7 +7,7 @@ shows. Each term maps one or two of these numbers to a goodness u in 0 … 1, th
 
 is monotone in every test, also for effects and set-ups that the table has not seen: a better test never
 lowers a probability. It stays within 0.02 … 0.98. ``b`` and ``w`` stand in ``gap/probabilities.json``, which
-``benchmarks/gap_calibrate.py`` writes from cases of the independent plant with whole effects left out.
+``benchmarks/blind/calibrate.py`` writes from cases of the independent plant with whole effects left out.
 
 A name also needs the conditions of `FamilyTests` (its family is the best, its form fits, no other family
 takes a share beside it) and that its size is one number (`Constancy`). Where one of them fails the cause is
@@ -26,10 +26,9 @@ from gcode2krl.effects import Role
 from gcode2krl.gap.posterior.cause_tests import Constancy, FamilyTests, Interval, Rest
 from gcode2krl.gap.posterior.examination import Examination
 from gcode2krl.gap.posterior.families import Evidence
-from gcode2krl.gap.posterior.selection import Rival
 from gcode2krl.gap.thresholds import THRESHOLDS, stated_table
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 MOST_NATS = 1000.0
 """Evidence beyond it says no more; also where there is nothing to compare with."""
 _DIGITS = 4
@@ -51,8 +50,6 @@ class Features:
     """Of the gap's power, what the best other family takes beside it."""
     other_power: float
     """That family's share of the power of both in the signal."""
-    other_p: float
-    """Of an evidence as large as that by chance."""
     inconstancy: float | None
     """Spread of its size over parts of the data beyond noise, over the size."""
     constant_p: float | None
@@ -69,16 +66,8 @@ class Features:
     """Of the gap on held-out data, the share that all causes of the link take."""
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
-    rest_share: float
-    """Of the gap, what the best family there takes beside all causes; 0 if insignificant."""
-    rival_nats: float
-    """By how much the best effect that the data can tell from it is worse."""
-    alike: int
-    """Number of effects that the data cannot tell from it."""
     causes: int
     """Number of causes that were accepted in the link."""
-    links_missing: int
-    """Number of links without data."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -148,18 +137,13 @@ def features_of(
     number: int,
     *,
     tests: FamilyTests,
-    rest: Rest,
     gap_p: float,
     constant: Constancy | None,
     parameters: dict[str, Interval],
-    rivals: Sequence[Rival],
     held_out: HeldOut,
 ) -> Features:
     """Return the features of an accepted effect."""
     chi2 = found.likelihood.chi2(found.without(number))
-    # by convention, not by the table, which is made from these numbers
-    told = [rival for rival in rivals if rival.behind_nats >= _LIMITS.alike_chi2 / 2.0]
-    near = [each for each in rest.worth_naming if tests.is_near(each)]
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(chi2 - found.fitted.chi2, 0.0) / found.data.values) ** 0.5,
@@ -167,7 +151,6 @@ def features_of(
         form_ratio=tests.form_ratio,
         other_share=tests.other_share,
         other_power=tests.other_power,
-        other_p=tests.other_p,
         inconstancy=None if constant is None else constant.inconstancy,
         constant_p=None if constant is None else constant.p,
         shape_interval=_shape_interval(found, number, parameters),
@@ -176,11 +159,7 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
-        rest_share=max((rest.share(each) for each in near), default=0.0),
-        rival_nats=_within(min((each.behind_nats for each in told), default=MOST_NATS)),
-        alike=len(rivals) - len(told),
         causes=len(found.causes),
-        links_missing=len(found.question.upstream),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,
@@ -250,7 +229,6 @@ TERMS: Terms = {
     "size": {"size_over_noise": Scale(0.05, 0.5, "log")},
     "family": {"margin": Scale(-10.0, 30.0, "asinh")},
     "form": {"form_ratio": Scale(0.6, 0.97, "log_rest")},
-    "alone": {"other_share": Scale(0.3, 0.02, "log"), "other_power": Scale(0.3, 0.02, "log")},
     "constant": {"inconstancy": Scale(0.5, 0.05, "log"), "constant_p": Scale(1e-4, 0.05, "log")},
     "shape": {"shape_interval": Scale(1.0, 0.3)},
     "folds": {"fold_agreement": Scale(0.0, 1.0)},
@@ -258,11 +236,7 @@ TERMS: Terms = {
     "together": {"shrink_together": Scale(0.5, 0.97, "log_rest")},
     "beside": {"shrink_where_others": Scale(0.02, 0.2, "log")},
     "left": {"share_left": Scale(0.5, 0.02, "log")},
-    "rest": {"rest_share": Scale(0.5, 0.02, "log")},
-    "rival": {"rival_nats": Scale(0.0, 50.0, "asinh")},
-    "alike": {"alike": Scale(5.0, 0.0)},
     "few": {"causes": Scale(4.0, 2.0)},
-    "links": {"links_missing": Scale(4.0, 0.0)},
     "gap": {"gap_p": Scale(0.1, 0.01, "log"), "surprise": Scale(0.0, 50.0, "asinh")},
     "conditions": {"conditions_failed": Scale(2.0, 0.0)},
 }
@@ -393,6 +367,8 @@ class FamilyProbability:
     evidence: Evidence
     features: FamilyFeatures
     probability: float
+    place_probability: float
+    """That its place is right, whatever the gap depends on there."""
 
 
 def family_probabilities(rest: Rest, larger_links: int = 0) -> list[FamilyProbability]:
@@ -416,7 +392,11 @@ def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbabil
     """Return a family of one component beside that of all, which is it where it has more evidence."""
     if told.evidence.place.component is None or told.evidence.nats > whole.evidence.nats:
         return told
-    return replace(told, probability=min(told.probability, 1.0 - whole.probability))
+    return replace(
+        told,
+        probability=min(told.probability, 1.0 - whole.probability),
+        place_probability=min(told.place_probability, 1.0 - whole.place_probability),
+    )
 
 
 def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:
@@ -427,10 +407,25 @@ def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[Fam
     behind = np.array([max(first.nats - each.nats, 0.0) / first.inflation for each in others])
     weights = np.exp(-behind / _LIMITS.temperature)
     shares = np.minimum((1.0 - own) * weights / (1.0 + weights.sum()), own)
+    there = [float(s) for s, each in zip(shares, others, strict=True) if each.place.name == first.place.name]
+    at_first = max(_of_place(own), clipped(own + sum(there)))  # one input at a place excludes another
     return [
-        FamilyProbability(first, features, own),
+        FamilyProbability(first, features, own, at_first),
         *(
-            FamilyProbability(each, family_features(rest, each, larger_links), float(share))
+            FamilyProbability(
+                each,
+                family_features(rest, each, larger_links),
+                float(share),
+                at_first
+                if each.place.name == first.place.name
+                else min(_of_place(float(share)), 1.0 - at_first),
+            )
             for each, share in zip(others, shares, strict=True)
         ),
     ]
+
+
+def _of_place(probability: float) -> float:
+    """Return the probability that a family's place is right: inputs at one place imitate each other."""
+    odds = _LIMITS.place_odds * probability / (1.0 - probability)
+    return clipped(odds / (1.0 + odds))

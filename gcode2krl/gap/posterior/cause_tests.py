@@ -36,7 +36,7 @@ from gcode2krl.gap.posterior.likelihood import Likelihood, sensitivity_of
 from gcode2krl.gap.posterior.study import Study, studies
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -323,7 +323,7 @@ def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
     """
     scale = fitted.numbers.box.scale
     jacobian = likelihood.jacobian(fitted.numbers, fitted.x, bounded=False)
-    information = jacobian.T @ jacobian + THRESHOLDS.fit.prior_sizes**-2 * np.eye(len(scale))
+    information = jacobian.T @ jacobian + THRESHOLDS.posterior.prior_sizes**-2 * np.eye(len(scale))
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     scores = likelihood.scores(jacobian, likelihood.residual(fitted.applied))
     if len(scores) >= _LIMITS.least_stretches:
@@ -331,8 +331,7 @@ def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
     return covariance * np.outer(scale, scale)
 
 
-_FAMILY_LIMITS = THRESHOLDS.families
-_PRIOR = THRESHOLDS.fit.prior_sizes
+_PRIOR = THRESHOLDS.posterior.prior_sizes
 _MOVED = 1e-3
 """Of the power in the component that a cause moves most: one with less is not moved."""
 
@@ -355,41 +354,35 @@ class FamilyTests:
 
     Slow noise hides the power of slow effects from chi2, so that a rest of a hundredth of the gap may take
     most of what can be told of it."""
-    other_p: float
-    """Of an evidence as large as that, if nothing admissible explains the rest."""
     family: Evidence | None
     """The best member of its own family."""
     better: Evidence | None
     """The best other family with the cause taken out."""
-    components: frozenset[int]
-    """Of the signal, which the cause moves."""
     family_behind: float | None = None
     """By how much the best function of what it depends on is worse than its form, in nats over the inflation;
     None where its family says nothing."""
-
-    def is_near(self, evidence: Evidence) -> bool:
-        """Tell whether a family is where the cause acts; one in another joint does not speak against it."""
-        return _is_in(self.components, evidence)
+    least_form: float = _LIMITS.form_ratio
+    """The share that its form has to take. Geometry is exact: that is off by no more than its numbers are."""
 
     @property
     def is_best(self) -> bool:
         """Tell whether no other family is better beyond what the data can tell."""
-        return self.margin > -_FAMILY_LIMITS.alike_nats
+        return self.margin > -_LIMITS.alike_nats
 
     @property
     def form_fits(self) -> bool:
         """Tell whether its form takes nearly all that its family takes."""
-        return self.form_ratio >= _FAMILY_LIMITS.form_ratio
+        return self.form_ratio >= self.least_form
 
     @property
     def is_alone(self) -> bool:
         """Tell whether no other family takes a share worth naming beside it."""
-        return self.other_share < _FAMILY_LIMITS.other_share or self.other_power < _FAMILY_LIMITS.other_power
+        return self.other_share < _LIMITS.other_share or self.other_power < _LIMITS.other_power
 
 
 def net_gain(evidence: Evidence) -> float:
     """Return twice the evidence: the gain minus what its numbers cost; 0 where it is not significant."""
-    significant = evidence.nats / evidence.inflation > _FAMILY_LIMITS.least_evidence
+    significant = evidence.nats / evidence.inflation > _LIMITS.least_evidence
     return 2.0 * evidence.nats if significant else 0.0
 
 
@@ -412,20 +405,18 @@ class Rest:
     @property
     def is_gap(self) -> bool:
         """Tell whether a family is so significant that there is a gap, whatever the size of the rest."""
-        return self._is_large or self.study.command_p <= _FAMILY_LIMITS.gap_p
+        return self._is_large or self.study.command_p <= _LIMITS.gap_p
 
     @property
     def _is_large(self) -> bool:
         """Tell whether one is so by its size and by the signs of stretches."""
         best = max(self.study.evidences, key=self._nats_beyond_time, default=None)
         # of all that is known the form is known to a hundredth of its size, however long one looks at it
-        if best is None or net_gain(best) < _FAMILY_LIMITS.form_error**2 * (
-            self.gap_gain + self.upstream_gain
-        ):
+        if best is None or net_gain(best) < _LIMITS.form_error**2 * (self.gap_gain + self.upstream_gain):
             return False
         # few strong stretches have few signs to flip; beyond all that models are off by, none are needed
-        is_rare = self.study.tail_p <= _FAMILY_LIMITS.gap_p
-        least = _FAMILY_LIMITS.gap_evidence if is_rare else _FAMILY_LIMITS.certain_evidence
+        is_rare = self.study.tail_p <= _LIMITS.gap_p
+        least = _LIMITS.gap_evidence if is_rare else _LIMITS.certain_evidence
         return self._nats_beyond_time(best) >= least
 
     def _nats_beyond_time(self, evidence: Evidence) -> float:
@@ -445,10 +436,10 @@ class Rest:
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
         """Return the families that take a share of the gap worth naming, the most probable first."""
-        least = _FAMILY_LIMITS.significant_p
+        least = _LIMITS.significant_p
         if not self.is_sized and self.study.p > least and self.study.command_p > least:
             return ()
-        return tuple(each for each in self.study.evidences if self.share(each) >= _FAMILY_LIMITS.other_share)
+        return tuple(each for each in self.study.evidences if self.share(each) >= _LIMITS.other_share)
 
 
 NOTHING_LEFT = Rest(Study(0.0, (), 1.0), 0.0)
@@ -547,11 +538,12 @@ class LinkFamilies:
             form_ratio=form / max(form + own_rest, 1e-30),
             other_share=0.0 if other is None else min(net_gain(other) / max(gap_gain, 1e-30), 1.0),
             other_power=0.0 if other is None else self._power_share(other, number),
-            other_p=1.0 if other is None else study_of_rest.p_of(other),
             family=of_cause[0] if of_cause else None,
             family_behind=(form_nats - of_cause[0].nats) / of_cause[0].inflation if of_cause else None,
+            least_form=1.0 - _LIMITS.model_error**2
+            if applied.effect.family == "geometry"
+            else _LIMITS.form_ratio,
             better=better,
-            components=components,
         )
 
     def _components(self, number: int) -> frozenset[int]:

@@ -35,6 +35,7 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.effect import JOINTS
+from gcode2krl.effects.inputs import gradient
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
 from gcode2krl.gap.compare.events import command_changes
@@ -50,7 +51,7 @@ from gcode2krl.gap.posterior.least_squares import Fitted, Numbers, Shortened, ga
 from gcode2krl.gap.posterior.likelihood import Key, Likelihood, once_among
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _NORMAL_MAD = 1.4826
 """The standard deviation of a normal over its median absolute deviation."""
 _MAD_EFFICIENCY = 0.37
@@ -60,7 +61,9 @@ _MOST_LAGS = 2000
 _MOMENT_ROWS, _LOUD = 12, 4.0
 """Rows of a moment, and so many times the median moment's power is loud: of white noise one in 10^6."""
 _LEAST_STRETCHES = 8
-"""In the cut and in air, which are compared."""
+"""Of each of two kinds that are compared."""
+_THIRDS = (1 / 3, 2 / 3)
+"""Of the stretches, the slow and the fast ones."""
 _EVENT_S = 0.3
 """Loud moments no farther apart are one event."""
 
@@ -92,7 +95,7 @@ class Size:
     moments_off: int = 0
     """Rows in which a model without noise is off by more than its accuracy, after the effects."""
     loud_in_step: float = 0.0
-    """The power of what is loud in step with the command, in one joint or in the cut, over the noise's.
+    """The power of what is loud in step with the command, in one joint or at work, over the noise's.
 
     0 where that may be chance.
     """
@@ -183,7 +186,7 @@ def size_of_gap(
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
         loud_in_step=max(
-            each(likelihood, structured) for each in (_loud_in_step, _rough_joint, _loud_in_cut)
+            each(likelihood, structured) for each in (_loud_in_step, _rough_joint, _loud_at_work)
         ),
     )
 
@@ -220,38 +223,50 @@ def _rough_joint(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
     return share if share > _LIMITS.rough_joint else 0.0
 
 
-def _loud_in_cut(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
-    """Return by how much louder a tip is in the cut than in air, over that; 0 where it may be chance.
+def _loud_at_work(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
+    """Return by how much louder a signal is while something is at work, over that; 0 where it may be chance.
 
-    Residuals (n, k) of each trace. A tracker knows nothing of the cut: what is louder there shakes the tip (a
-    rank test, Mann & Whitney 1947, over stretches as long as an event).
+    Residuals (n, k) of each trace. A tracker knows nothing of the cut, an encoder nothing of how fast its
+    joint turns: what is louder then is the machine's (a rank test, Mann & Whitney 1947, over stretches as
+    long as an event).
     """
     from scipy.stats import mannwhitneyu
 
     traces, components = likelihood.traces, len(likelihood.noise)
-    if not traces[0].link.of_tip or traces[0].still:
+    if traces[0].still or not (traces[0].link.of_tip or traces[0].of_six_encoders):
         return 0.0
     loudest = 0.0
     for j in range(components):
-        cut, air = [], []
+        power, work = [], []
         for number, (trace, residual) in enumerate(zip(traces, residuals, strict=True)):
-            rows = nearest_rows(trace.inputs.time_s, trace.time_s)
-            is_cutting = np.any(trace.inputs.force_base_N[rows], axis=1)
             stretch = ((trace.time_s - trace.time_s[0]) / _EVENT_S).astype(np.int64)
-            squares = likelihood.white(number, j, residual[:, [j]])[:, 0] ** 2
             count = np.bincount(stretch)
-            power = np.bincount(stretch, weights=squares) / np.maximum(count, 1)
-            cutting = np.bincount(stretch, weights=is_cutting)
-            # what is partly in the cut tells of neither
-            cut.append(power[(count > 0) & (cutting == count)])
-            air.append(power[(count > 0) & (cutting == 0)])
-        in_cut, in_air = np.concatenate(cut), np.concatenate(air)
-        if min(len(in_cut), len(in_air)) < _LEAST_STRETCHES:
+            squares = likelihood.white(number, j, residual[:, [j]])[:, 0] ** 2
+            of_rows = (squares, _work(trace, j))
+            means = [np.bincount(stretch, each)[count > 0] / count[count > 0] for each in of_rows]
+            power.append(means[0])
+            work.append(means[1])
+        powers, works = np.concatenate(power), np.concatenate(work)
+        # of the cut what is partly in it tells of neither
+        least, most = (0.0, 1.0) if traces[0].link.of_tip else np.quantile(works, _THIRDS)
+        idle, busy = powers[works <= least], powers[works >= most]
+        if min(len(idle), len(busy)) < _LEAST_STRETCHES or least == most:
             continue
-        louder = float(np.median(in_cut)) / max(float(np.median(in_air)), 1e-30) - 1.0
-        if mannwhitneyu(in_cut, in_air, alternative="greater").pvalue < _LIMITS.loud_p / components:
+        louder = float(np.median(busy)) / max(float(np.median(idle)), 1e-30) - 1.0
+        if mannwhitneyu(busy, idle, alternative="greater").pvalue < _LIMITS.loud_p / components:
             loudest = max(loudest, louder)
-    return loudest if loudest > _LIMITS.rough_joint else 0.0
+    return loudest if loudest > _LIMITS.loud_share else 0.0
+
+
+def _work(trace: Trace, component: int) -> Floats:
+    """Return of each row (n,) whether a tip's tool cuts, or how fast an encoder's joint turns."""
+    inputs, rows = trace.inputs, nearest_rows(trace.inputs.time_s, trace.time_s)
+    if trace.link.of_tip:
+        cuts: Floats = np.any(inputs.force_base_N[rows], axis=1).astype(np.float64)
+        return cuts
+    joint = JOINTS.index(trace.components[component])
+    speed: Floats = np.abs(gradient(inputs.q_cmd_rad[:, [joint]], inputs.time_s)[rows, 0])
+    return speed
 
 
 def _loud_in_step(likelihood: Likelihood, residuals: Sequence[Floats]) -> float:
@@ -294,7 +309,7 @@ def _share_in_step(power: Floats, changes: Bools, components: int, apart: float)
     loudest = np.repeat(np.maximum.reduceat(power[loud], first), np.diff(first, append=len(loud)))
     in_step = np.logical_or.reduceat((power[loud] == loudest) & changes[loud], first)
     count = int(np.count_nonzero(in_step))
-    if count < THRESHOLDS.beside.in_step_least:
+    if count < THRESHOLDS.compare.in_step_least:
         return 0.0
     chance = components * bdtrc(count - 1, len(first), float(np.mean(changes)))
     here = loud[changes[loud]]
@@ -512,7 +527,7 @@ def _blocks(
         return
     residuals = [trace.residual for trace in traces]
     step_s = usual_step_s(traces[0].time_s)
-    peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.beside.frequency_peaks)
+    peaks = strongest_hz(residuals, step_s, p.low, p.high, THRESHOLDS.posterior.frequency_peaks)
     duration_s = float(traces[0].time_s[-1] - traces[0].time_s[0])
     yield from blocks_at(effect, target, peaks, (p.high - p.low) * duration_s)
 

@@ -125,7 +125,7 @@ class Rows:
 def _block_starts(trace: Trace) -> Ints:
     """Return the first rows of blocks; none reaches over a gap of the data."""
     step_s = usual_step_s(trace.time_s)
-    length = max(1, int(1.0 / (THRESHOLDS.families.rows_hz * step_s) + 1e-6))
+    length = max(1, int(1.0 / (THRESHOLDS.posterior.rows_hz * step_s) + 1e-6))
     return np.concatenate([np.arange(first, last, length) for first, last in trace.segments])
 
 
@@ -134,7 +134,7 @@ def _members(stretches: Ints) -> csr_array:
     return csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(names), len(at)))
 
 
-_PRIOR = THRESHOLDS.fit.prior_sizes**-2
+_PRIOR = THRESHOLDS.posterior.prior_sizes**-2
 _LEAST_SAYING = 3
 """Components: fewer cannot outvote one that has an effect."""
 _MEDIAN_VARIANCE = float(np.pi / 2.0)
@@ -296,7 +296,7 @@ class View:
         """
         generator = np.random.default_rng(0)
         runs = int(self.runs.max(initial=0)) + 1
-        moves = THRESHOLDS.families.moves
+        moves = THRESHOLDS.posterior.moves
         shares = generator.uniform(*_MOVED_BY, (moves, runs))
         signs = np.where(generator.random((moves, runs)) < 0.5, -1.0, 1.0)
         moved = np.empty((moves, len(self.projected)))
@@ -414,7 +414,7 @@ class Beside:
         return scores
 
 
-AMPLITUDES = np.array(THRESHOLDS.families.amplitudes)
+AMPLITUDES = np.array(THRESHOLDS.posterior.amplitudes)
 _RANK = 1e-9
 """Eigenvalues below this share of the largest hold rounding errors only."""
 

@@ -30,7 +30,7 @@ from gcode2krl.identify.kinematics import (
 )
 from gcode2krl.runs.measured import Poses
 
-_FIT_LIMITS = THRESHOLDS.fit
+_LIMITS = THRESHOLDS.posterior
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,9 @@ def geometry_of_arm(pairs: Sequence[Pair], explaining: int, share_left: float) -
     ]
     good: Bools = ~fit.is_outlier
     before_mm = rms(np.concatenate(raw)[good])
-    if share_left * before_mm > _FIT_LIMITS.poses_mostly_frames * fit.rms_before_mm:
+    if share_left * before_mm > _LIMITS.poses_mostly_frames * fit.rms_before_mm:
         return None
-    most = _FIT_LIMITS.poses_geometry_share * min(share_left * before_mm, fit.rms_before_mm)
+    most = _LIMITS.poses_geometry_share * min(share_left * before_mm, fit.rms_before_mm)
     if fit.rms_after_mm > most:
         return None
     corrected = tuple(
@@ -110,9 +110,6 @@ def _corrected(pair: Pair, table: Poses, tips_mm: Floats) -> Pair:
     return replace(pair, run=replace(pair.run, poses=replace(table, position_mm=position)))
 
 
-_COMPARE_LIMITS = THRESHOLDS.beside
-
-
 @dataclass(frozen=True, kw_only=True)
 class SurfaceJudgement(Judged):
     """The judgement of the part's surface, whose signal is a place; lengths in mm."""
@@ -140,7 +137,7 @@ def judge_surface(link: SurfaceLink, context: Context) -> SurfaceJudgement | Non
     if (
         not clouds
         or effect is None
-        or sum(cloud.wall.sum() for cloud in clouds) < _COMPARE_LIMITS.scan_least_points
+        or sum(cloud.wall.sum() for cloud in clouds) < THRESHOLDS.compare.scan_least_points
     ):
         return None
     return _judgement(link, _finding(clouds, effect, context), context)
@@ -179,12 +176,12 @@ class _Finding:
 def _judgement(link: SurfaceLink, finding: _Finding, context: Context) -> SurfaceJudgement:
     """Return the judgement; a cause that an earlier link has named is not repeated."""
     effect = finding.applied.effect
-    sure = finding.is_gap and finding.shrink >= _COMPARE_LIMITS.scan_least_shrink
+    sure = finding.is_gap and finding.shrink >= _LIMITS.scan_least_shrink
     named = {applied.effect.name for judged in context.judgements for applied in judged.applied}
     cause = Cause(
         applied=finding.applied,
         link=link.name,
-        probability=_COMPARE_LIMITS.scan_probability if sure else _COMPARE_LIMITS.scan_probability_unsure,
+        probability=_LIMITS.scan_probability if sure else _LIMITS.scan_probability_unsure,
         parameters={effect.names[0]: finding.interval},
         shrink=finding.shrink,
         rms_after=finding.after**0.5,
@@ -238,12 +235,12 @@ def _finding(clouds: Sequence[SurfacePoints], effect: Effect, context: Context) 
     gap2 = float(np.mean([p[0] for p in power])) - noise2 if power else 0.0
     left2 = float(np.mean([p[1] for p in power])) - noise2 if power else 0.0
     shrink = float(np.clip(1.0 - left2 / gap2, 0.0, 1.0)) if gap2 > 0.0 else 0.0
-    deviation = float(np.hypot(np.sqrt(covariance[0, 0]), _COMPARE_LIMITS.scan_tip_mm))
+    deviation = float(np.hypot(np.sqrt(covariance[0, 0]), _LIMITS.scan_tip_mm))
     inputs = context.pairs[0].inputs
     per_size = _radius_per_size(effect, inputs)
     offset = Interval(*(float((b[0] + k * deviation) / per_size) for k in (0.0, -1.645, 1.645)))
     usual = effect.usual(context.mismatch, 1.0)[effect.names[0]]
-    is_gap = abs(b[0] / per_size) > usual + _COMPARE_LIMITS.scan_certain * deviation
+    is_gap = abs(b[0] / per_size) > usual + _LIMITS.scan_certain * deviation
     return _Finding(
         applied=Applied(effect, None, {effect.names[0]: offset.value}),
         interval=offset,
@@ -260,7 +257,7 @@ def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Float
     rows = sum(len(cloud.deviation) for cloud in clouds)
     x = np.zeros((rows, 1 + 5 * len(clouds)))
     prior = np.zeros(x.shape[1])
-    prior[0] = 1.0 / _COMPARE_LIMITS.scan_rough_mm**2
+    prior[0] = 1.0 / _LIMITS.scan_rough_mm**2
     at = 0
     for number, cloud in enumerate(clouds):
         rows_here, first = slice(at, at + len(cloud.deviation)), 1 + 5 * number
@@ -269,11 +266,10 @@ def _columns(clouds: Sequence[SurfacePoints], mismatch: Mismatch) -> tuple[Float
         x[rows_here, first + 2] = ~cloud.wall
         x[rows_here, first + 3] = cloud.deflection
         x[rows_here, first + 4] = (
-            np.where(cloud.wall, 0.0, cloud.place[:, 0] - cloud.place[:, 0].mean())
-            / _COMPARE_LIMITS.scan_block_mm
+            np.where(cloud.wall, 0.0, cloud.place[:, 0] - cloud.place[:, 0].mean()) / _LIMITS.scan_block_mm
         )
         prior[first : first + 2] = 1.0 / sigma(mismatch.frame_mm) ** 2
-        prior[first + 2] = 1.0 / _COMPARE_LIMITS.scan_rough_mm**2
+        prior[first + 2] = 1.0 / _LIMITS.scan_rough_mm**2
         prior[first + 3] = 1.0 / sigma(mismatch.stiffness) ** 2
         prior[first + 4] = 1.0 / sigma(mismatch.frame_mm) ** 2
         at += len(cloud.deviation)
@@ -292,7 +288,7 @@ def _blocks(clouds: Sequence[SurfacePoints]) -> Ints:
 
 def _in_blocks(cloud: SurfacePoints) -> Floats:
     """Return the column and row (n, 2) of the block of each point."""
-    return np.floor(cloud.place[:, :2] / _COMPARE_LIMITS.scan_block_mm)
+    return np.floor(cloud.place[:, :2] / _LIMITS.scan_block_mm)
 
 
 def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
@@ -307,7 +303,7 @@ def _solved(x: Floats, y: Floats, prior: Floats) -> Floats:
 
 def _inliers(x: Floats, y: Floats, prior: Floats) -> Bools:
     residual = y - x @ _solved(x, y, prior)
-    good: Bools = np.abs(residual) < _COMPARE_LIMITS.scan_outliers * 1.4826 * np.median(np.abs(residual))
+    good: Bools = np.abs(residual) < _LIMITS.scan_outliers * 1.4826 * np.median(np.abs(residual))
     return good
 
 

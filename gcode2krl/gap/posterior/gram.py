@@ -160,7 +160,7 @@ def gain_inflation(inverse: Floats, scores: Floats, fitted: int) -> float:
     return float(max(1.0, grown * clusters / max(clusters - fitted, 1)))
 
 
-_PRIOR = THRESHOLDS.fit.prior_sizes
+_PRIOR = THRESHOLDS.posterior.prior_sizes
 _RANK = 1e-9
 """Eigenvalues below this share of the largest hold rounding errors only."""
 

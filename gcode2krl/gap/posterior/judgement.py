@@ -49,7 +49,7 @@ from gcode2krl.gap.posterior.likelihood import Key, refit
 from gcode2krl.gap.posterior.selection import Rival, examine, rival_probabilities, rivals_of, with_rival
 from gcode2krl.gap.thresholds import THRESHOLDS
 
-NAMED = THRESHOLDS.choose.named
+NAMED = THRESHOLDS.posterior.named
 """A cause counts as named from this probability on."""
 
 
@@ -163,7 +163,7 @@ class Judgement(Judged):
         return fitted_signal(trace, self.examination, stamps_s)
 
 
-_MOST_S = THRESHOLDS.choose.clock_most_s
+_MOST_S = THRESHOLDS.posterior.clock_most_s
 _ROUNDS = 2
 """The second takes off what the first leaves of its own linearisation."""
 _RIDGE = 1e-6
@@ -255,7 +255,7 @@ def _is_own_time(evidences: Sequence[Evidence]) -> bool:
     """Tell whether time in each run, smoothly, says clearly more than every other input."""
     best = evidences[0]
     others = [each.nats for each in evidences if each.on is not Dependence.RUN_TIME]
-    least = THRESHOLDS.families.alike_nats * best.inflation
+    least = THRESHOLDS.posterior.alike_nats * best.inflation
     return best.on is Dependence.RUN_TIME and best.nats - max(others, default=0.0) > least
 
 
@@ -264,9 +264,9 @@ def _is_small(evidence: Evidence, noise: Sequence[Noise]) -> bool:
     component = evidence.place.component
     at = slice(None) if component is None else slice(component, component + 1)
     rms = np.sqrt(np.mean(np.concatenate(evidence.signal) ** 2, axis=0))
-    most = THRESHOLDS.fit.noise_most_slow * np.array([each.short_sigma for each in noise[at]])
+    most = THRESHOLDS.noise.noise_most_slow * np.array([each.short_sigma for each in noise[at]])
     moved = [float(np.linalg.norm(np.std(signal, axis=0))) for signal in evidence.signal]
-    is_stationary = min(moved) >= THRESHOLDS.fit.noise_wander_share * max(moved)
+    is_stationary = min(moved) >= THRESHOLDS.posterior.noise_wander_share * max(moved)
     return is_stationary and bool(np.all(rms <= most))
 
 
@@ -287,7 +287,7 @@ def _causes_taken_out(examination: Examination) -> Examination:
     return examination
 
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _SURE_DEVIATIONS = 2.0
 """Of the excess on data not used, beyond which it is no chance."""
 _LEAST_REST = 1e-6
@@ -496,7 +496,7 @@ def _judgement(
     named = [examination.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = is_significant if named else sizes[0].significant
     rest = replace(families.beside(named), is_sized=is_sized)
-    is_left = is_significant and last.share_left >= THRESHOLDS.families.other_share
+    is_left = is_significant and last.share_left >= THRESHOLDS.posterior.other_share
     is_gap = _is_gap(examination, sizes[0], rest)
     if not named and is_gap:
         is_gap = not is_wander(examination, families.traces, rest)
@@ -552,11 +552,9 @@ def _causes(
             examination,
             number,
             tests=tests,
-            rest=every,
             gap_p=families.gap_p[order],
             constant=constant,
             parameters=intervals[number],
-            rivals=rivals,
             held_out=_held_out(examination, order, sizes, every, trials),
         )
         table = probabilities_table()

@@ -221,7 +221,7 @@ def _explored(
     return x, best
 
 
-_LIMITS = THRESHOLDS.fit
+_LIMITS = THRESHOLDS.posterior
 _AT_BOUND = 1e-3
 _MOMENT_S = 2.0
 """Typical size of a moment: differences of a fiftieth of it are those of a short slip."""

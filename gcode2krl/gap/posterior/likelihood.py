@@ -188,7 +188,7 @@ def _spanned(index: np.ndarray, signatures: SignatureGram, design: NuisanceDesig
         share[places] = explained / np.maximum(whole, 1e-300)
     spanned = np.zeros(design.width, dtype=np.bool_)
     for places in design.of_runs:
-        spanned[places] = bool(np.all(share[places] >= THRESHOLDS.fit.same_form))
+        spanned[places] = bool(np.all(share[places] >= THRESHOLDS.posterior.same_form))
     return spanned
 
 
@@ -207,7 +207,7 @@ def _imitating(
         return np.zeros((design.width, 0)), 0.0
     made = solve(inner, cross[:, at])
     shares, vectors = linalg.eigh(cross[:, at].T @ made, gram[np.ix_(at, at)] + np.eye(len(at)))
-    imitating = vectors[:, shares >= THRESHOLDS.fit.same_form]
+    imitating = vectors[:, shares >= THRESHOLDS.posterior.same_form]
     directions = np.zeros((design.width, imitating.shape[1]))
     directions[at] = np.linalg.qr(imitating)[0]
     within = MOST / np.maximum(np.abs(imitating).max(axis=0, initial=0.0), 1e-300)

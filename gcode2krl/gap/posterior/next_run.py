@@ -50,7 +50,7 @@ from gcode2krl.gap.posterior.likelihood import STEP_SHARE, Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import S_PER_MIN
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _LEAST = 1e-12
 """Of information: keeps what nothing is known of finite."""
 

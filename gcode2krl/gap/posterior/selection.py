@@ -37,7 +37,7 @@ from gcode2krl.gap.posterior.least_squares import Fitted
 from gcode2krl.gap.posterior.likelihood import Key, Sensitivity, refit, searched, sensitivity_of
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 
-_LIMITS = THRESHOLDS.choose
+_LIMITS = THRESHOLDS.posterior
 _ASYMPTOTIC = 100.0
 """From this chi2/2 on the first term of the asymptotic series is taken: off by (width - 2)/gain at most."""
 

@@ -47,7 +47,7 @@ from gcode2krl.runs.matching import rotation_between
 from gcode2krl.units import DEG_PER_RAD
 
 _TOOL, _BASE = "tool_number", "base_number"
-_LIMITS = THRESHOLDS.slips
+_LIMITS = THRESHOLDS.posterior
 
 
 def frame_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
@@ -119,7 +119,7 @@ def _refined(traces: Sequence[Trace], base: Applied) -> Applied:
         [Nuisance("clock", False, -np.ascontiguousarray(trace.rate.T)[:, :, None] * Mismatch.clock_s)]
         for trace in traces
     ]
-    noise = [white(THRESHOLDS.beside.model_rad)] * traces[0].shape[1]
+    noise = [white(THRESHOLDS.compare.model_rad)] * traces[0].shape[1]
     return refit(Likelihood(traces, clocks, noise), (base,), steps=_LIMITS.frame_fit_steps).applied[0]
 
 
@@ -153,7 +153,7 @@ def tracker_frame_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> 
         trace for trace in MECHANICS.traces(pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
     ]
     effect = library.get(_TRACKER_FRAME)
-    if effect is None or not traces or rms_before(traces) < THRESHOLDS.slips.tracker_off_mm:
+    if effect is None or not traces or rms_before(traces) < THRESHOLDS.posterior.tracker_off_mm:
         return []
     predicted_mm = np.concatenate([trace.nominal for trace in traces])
     measured_mm = np.concatenate([trace.measured for trace in traces])

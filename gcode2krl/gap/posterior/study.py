@@ -130,10 +130,10 @@ def simplest_first(evidences: Iterable[Evidence]) -> tuple[Evidence, ...]:
 def _ahead_share(larger: Evidence) -> float:
     """Return the share of its evidence from which on a larger family is ahead of one within it."""
     is_time = larger.on is Dependence.RUN_TIME
-    return THRESHOLDS.families.time_ahead_share if is_time else THRESHOLDS.families.ahead_share
+    return THRESHOLDS.posterior.time_ahead_share if is_time else THRESHOLDS.posterior.ahead_share
 
 
-_STEP_S = THRESHOLDS.families.step_s
+_STEP_S = THRESHOLDS.posterior.step_s
 _MOST = 40
 """Moments that are tried in one run."""
 _FROM_END_S = 1.0
@@ -299,7 +299,7 @@ def step_evidence(view: View, steps: Steps, signs: Floats) -> Evidence | None:
     return None if evidence is None else replace(evidence, flipped=log_mean(flipped), stays=finer[best][2])
 
 
-_LIMITS = THRESHOLDS.families
+_LIMITS = THRESHOLDS.posterior
 _TONES_FINER = 4
 """Frequencies that are tried for each that the length of a run can tell."""
 _BINS = 4096

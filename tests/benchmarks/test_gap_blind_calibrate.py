@@ -8,29 +8,26 @@ import numpy as np
 import pytest
 
 from gcode2krl.gap.posterior.calibrated import FAMILY_TERMS, NAME, TERMS, Probabilities
-from tests.benchmarks import hand_made
+from tests.benchmarks import hand_made, made_up_records
 
 assert hand_made.BENCHMARKS.is_dir()  # where the modules below are found
-script, fit, rows_, made_up = (
-    import_module(name)
-    for name in ("gap_calibrate", "gap_calibrate_fit", "gap_calibrate_rows", "gap_calibrate_made_up")
-)
+calibrate = import_module("blind.calibrate")
 
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    return rows_.records_of(made_up.write_made_up(tmp_path_factory.mktemp("made_up")))
+    return calibrate.records_of(made_up_records.write_made_up(tmp_path_factory.mktemp("made_up")))
 
 
 def row(term, value, right, group="a", kind="single"):
     """Return a row that is good in all terms but one."""
     u = tuple(value if name == term else 1.0 for name in TERMS)
-    return rows_.Row(case="c", kind=kind, group=frozenset({group}), u=u, right={NAME: right}, before=0.9)
+    return calibrate.Row(case="c", kind=kind, group=frozenset({group}), u=u, right={NAME: right}, before=0.9)
 
 
 def test_the_script_writes_a_table_that_the_diagnosis_takes(tmp_path, capsys):
-    folder, target = made_up.write_made_up(tmp_path / "records"), tmp_path / "table.json"
-    assert script.main([str(folder), "-o", str(target)]) == 0
+    folder, target = made_up_records.write_made_up(tmp_path / "records"), tmp_path / "table.json"
+    assert calibrate.main([str(folder), "-o", str(target)]) == 0
     table = json.loads(target.read_text(encoding="utf-8"))
     known = Probabilities.of(table)
     assert set(table["heads"]) == {"name", "family", "unknown", "dependence"}
@@ -47,14 +44,15 @@ def test_the_script_writes_a_table_that_the_diagnosis_takes(tmp_path, capsys):
 def test_the_same_records_make_the_same_table(tmp_path):
     tables = []
     for name in ("first", "second"):
-        assert script.main(["--made-up", "-o", str(tmp_path / name)]) == 0
+        folder = made_up_records.write_made_up(tmp_path / f"{name} records")
+        assert calibrate.main([str(folder), "-o", str(tmp_path / name)]) == 0
         tables.append((tmp_path / name).read_text(encoding="utf-8"))
     assert tables[0] == tables[1]
 
 
 def test_the_prior_speaks_for_every_term():
-    assert set(fit.ONE_WORST) == set(TERMS) | set(FAMILY_TERMS)
-    model = fit.fitted([], NAME)
+    assert set(calibrate.ONE_WORST) == set(TERMS) | set(FAMILY_TERMS)
+    model = calibrate.fitted([], NAME)
     best = model.probability([1.0] * len(TERMS))
     assert best > 0.75
     for number, term in enumerate(TERMS):
@@ -65,26 +63,26 @@ def test_the_prior_speaks_for_every_term():
 def test_a_test_that_parts_right_from_wrong_gets_the_weight():
     draw = np.random.default_rng(2)
     rows = [row("form", value, draw.random() < value) for value in draw.random(400)]
-    model = dict(zip(TERMS, fit.fitted(rows, NAME).weights, strict=True))
+    model = dict(zip(TERMS, calibrate.fitted(rows, NAME).weights, strict=True))
     assert model["form"] > 3.0
     assert model["form"] == max(model.values())
     # logistic regression recovers about what it was drawn from: P = u has odds of 9 at 0.9 and 1/9 at 0.1
-    found = [fit.fitted(rows, NAME).probability(row("form", u, True).u) for u in (0.1, 0.5, 0.9)]
+    found = [calibrate.fitted(rows, NAME).probability(row("form", u, True).u) for u in (0.1, 0.5, 0.9)]
     assert found == pytest.approx([0.1, 0.5, 0.9], abs=0.1)
 
 
 def test_a_test_that_speaks_the_wrong_way_gets_none():
-    rows = [row("rival", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
-    assert dict(zip(TERMS, fit.fitted(rows, NAME).weights, strict=True))["rival"] == 0.0
+    rows = [row("shape", value, value < 0.5) for value in np.linspace(0.0, 1.0, 200)]
+    assert dict(zip(TERMS, calibrate.fitted(rows, NAME).weights, strict=True))["shape"] == 0.0
 
 
 def test_a_left_out_effect_teaches_nothing_about_itself():
     """Two effects fail another test each; the model of the one does not know the other's."""
     rows = [row("form", 0.0, False, "a")] * 40 + [row("form", 1.0, True, "a")] * 40
     rows += [row("constant", 0.0, False, "b")] * 40 + [row("constant", 1.0, True, "b")] * 40
-    own = [fit.fitted(rows, NAME).probability(each.u) for each in rows]
-    scores = fit.unseen_scores(rows, NAME)
-    unseen = fit.left_out(rows, NAME, scores)
+    own = [calibrate.fitted(rows, NAME).probability(each.u) for each in rows]
+    scores = calibrate.unseen_scores(rows, NAME)
+    unseen = calibrate.left_out(rows, NAME, scores)
     assert unseen[0] > own[0]
     assert unseen[80] > own[80]
     assert len(set(scores[:40])) == 1
@@ -95,28 +93,28 @@ def test_scores_that_are_too_sure_of_unseen_effects_are_stretched():
     rows = [row("form", 1.0, i % 4 > 0, f"e{i // 20}") for i in range(400)]
     rows += [row("form", 0.0, i % 4 == 0, f"e{i // 20}") for i in range(400)]
     scores = np.repeat([2.0, -2.0], 400)
-    stretch = fit.Stretch.of(rows, scores, NAME)
+    stretch = calibrate.Stretch.of(rows, scores, NAME)
     assert stretch.slope == pytest.approx(math.log(3.0) / 2.0, rel=0.05)
     assert stretch.shift == pytest.approx(0.0, abs=0.05)
-    assert fit.left_out(rows, NAME, scores)[[0, 400]] == pytest.approx([0.75, 0.25], abs=0.02)
-    model = fit.fitted(rows, NAME)
+    assert calibrate.left_out(rows, NAME, scores)[[0, 400]] == pytest.approx([0.75, 0.25], abs=0.02)
+    model = calibrate.fitted(rows, NAME)
     u = rows[0].u
     assert stretch.stretched(model).score(u) == pytest.approx(
         stretch.slope * model.score(u) + stretch.shift, abs=0.01
     )
-    few = fit.Stretch.of([], np.zeros(0), NAME)
+    few = calibrate.Stretch.of([], np.zeros(0), NAME)
     assert (few.slope, few.shift) == (1.0, 0.0)
 
 
 def test_foreign_cases_count_as_much_as_all_others():
     rows = [row("form", 1.0, True)] * 90 + [row("form", 0.0, False, "x", kind="open")] * 10
-    weights = fit.weights_of(rows)
+    weights = calibrate.weights_of(rows)
     assert weights[:90].sum() == pytest.approx(weights[90:].sum()) == pytest.approx(50.0)
 
 
 def test_scores_are_those_of_hand_made_rows():
     rows = [row("form", 1.0, right) for right in (True, True, False, True)]
-    found = fit.scores_of(rows, np.array([0.95, 0.95, 0.95, 0.35]), NAME)
+    found = calibrate.scores_of(rows, np.array([0.95, 0.95, 0.95, 0.35]), NAME)
     assert found.ece == pytest.approx((abs(3 * 0.95 - 2.0) + abs(0.35 - 1.0)) / 4.0)
     assert found.brier == pytest.approx((2 * 0.05**2 + 0.95**2 + 0.65**2) / 4.0)
     assert found.log == pytest.approx(-np.log([0.95, 0.95, 0.05, 0.35]).mean())
@@ -126,15 +124,16 @@ def test_scores_are_those_of_hand_made_rows():
 def test_conformal_threshold_covers_what_it_promises():
     draw = np.random.default_rng(3)
     behind = [
-        rows_.Behind(frozenset({str(i)}), float(nats)) for i, nats in enumerate(draw.exponential(size=400))
+        calibrate.Behind(frozenset({str(i)}), float(nats))
+        for i, nats in enumerate(draw.exponential(size=400))
     ]
-    count, of = fit.covered(behind)
+    count, of = calibrate.covered(behind)
     assert of == 400
     assert count / of >= 0.94
-    assert fit.conformal_nats(behind) == pytest.approx(-math.log(0.05), rel=0.2)
-    assert fit.conformal_nats(behind[:5]) == math.inf
+    assert calibrate.conformal_nats(behind) == pytest.approx(-math.log(0.05), rel=0.2)
+    assert calibrate.conformal_nats(behind[:5]) == math.inf
     assert (
-        fit.covered([*behind, rows_.Behind(frozenset({"x"}), None)])[1] == 400
+        calibrate.covered([*behind, calibrate.Behind(frozenset({"x"}), None)])[1] == 400
     )  # what was not compared has no score
 
 
@@ -145,19 +144,19 @@ def test_the_set_follows_the_threshold_and_makes_a_name_right(records):
         if r["case"]["kind"] == "single" and r["result"]["causes"][0]["effect"] == "hysteresis"
     )
     cause = wrong["result"]["causes"][0]
-    assert [each["behind_nats"] for each in rows_.with_set(cause, 4.6)["indistinguishable_from"]] == [2.0]
-    assert [each["behind_nats"] for each in rows_.with_set(cause, 8.0)["indistinguishable_from"]] == [
+    assert [each["behind_nats"] for each in calibrate.with_set(cause, 4.6)["indistinguishable_from"]] == [2.0]
+    assert [each["behind_nats"] for each in calibrate.with_set(cause, 8.0)["indistinguishable_from"]] == [
         2.0,
         7.0,
     ]
-    assert [row.right[NAME] for row in rows_.cause_rows([wrong], 4.6)] == [False]
-    assert [row.right[NAME] for row in rows_.cause_rows([wrong], 8.0)] == [True]
-    assert [each.nats for each in rows_.behind_of([wrong])] == [7.0]
+    assert [row.right[NAME] for row in calibrate.cause_rows([wrong], 4.6)] == [False]
+    assert [row.right[NAME] for row in calibrate.cause_rows([wrong], 8.0)] == [True]
+    assert [each.nats for each in calibrate.behind_of([wrong])] == [7.0]
 
 
 def test_what_the_library_lacks_has_no_right_name(records):
     outside = [record for record in records if record["case"]["kind"] in ("open", "deleted")]
-    rows = list(rows_.cause_rows(outside, 100.0))
+    rows = list(calibrate.cause_rows(outside, 100.0))
     assert not any(row.right["name"] for row in rows)
     assert all(row.right["unknown"] for row in rows)
     assert any(row.right["family"] for row in rows)
@@ -179,9 +178,9 @@ def changed(folder, change):
     ],
 )
 def test_sealed_seeds_and_records_of_other_tests_are_refused(tmp_path, capsys, change, words):
-    folder = made_up.write_made_up(tmp_path)
+    folder = made_up_records.write_made_up(tmp_path)
     changed(folder, change)
-    assert script.main([str(folder), "-o", str(tmp_path / "t.json")]) == 2
+    assert calibrate.main([str(folder), "-o", str(tmp_path / "t.json")]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "t.json").exists()
 
@@ -196,17 +195,17 @@ def test_sealed_seeds_and_records_of_other_tests_are_refused(tmp_path, capsys, c
     ],
 )
 def test_what_no_data_can_tell_teaches_nothing(tmp_path, kind, stand_ins, teaches):
-    folder = made_up.write_made_up(tmp_path)
+    folder = made_up_records.write_made_up(tmp_path)
 
     def change(record):
         record["case"].update(seed=1, kind=kind)
         record["label"]["effects"][0]["stand_ins"] = stand_ins
 
     changed(folder, change)
-    taught = [record["case"]["seed"] for record in rows_.records_of(folder)]
+    taught = [record["case"]["seed"] for record in calibrate.records_of(folder)]
     assert (1 in taught) is teaches
 
 
 def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(rows_.RecordsError, match="no records"):
-        rows_.records_of(tmp_path)
+    with pytest.raises(calibrate.RecordsError, match="no records"):
+        calibrate.records_of(tmp_path)

@@ -1,6 +1,6 @@
 """Real data that a person has fetched, diagnosed: docs/real_data.md says what is expected of them.
 
-``python benchmarks/gap_real.py FOLDER`` with FOLDER a copy of JonasWeigand/Robot_Identification on GitHub
+``python benchmarks/real_data.py FOLDER`` with FOLDER a copy of JonasWeigand/Robot_Identification on GitHub
 (MIT): three logs of a KUKA KR 300 R2500 ultra. Its files become run folders, which are diagnosed from the log
 alone; what is measured is printed beside what was expected. ``--runs DIR`` keeps the run folders. Without
 FOLDER the same is done with made-up logs, to try the program; they are not judged.

@@ -19,7 +19,6 @@ GOOD = Features(
     form_ratio=0.98,
     other_share=0.0,
     other_power=0.0,
-    other_p=1.0,
     inconstancy=0.02,
     constant_p=0.4,
     shape_interval=0.1,
@@ -28,11 +27,7 @@ GOOD = Features(
     shrink_where_others=1.0,
     shrink_together=0.97,
     share_left=0.0,
-    rest_share=0.0,
-    rival_nats=60.0,
-    alike=0,
     causes=1,
-    links_missing=1,
     gap_p=0.005,
     conditions_failed=0,
 )
@@ -46,7 +41,6 @@ _BAD = {
     "fold_agreement": 0.3,
     "shrink_of_rest": 0.6,
     "share_left": 0.2,
-    "rest_share": 0.1,
 }
 """Of wrong names; each is drawn with an even chance, and one of a right name now and then."""
 _DEPENDS = {"where": "joint", "target": "A2", "joints": ["A2"], "on": ["reversals"], "form": "loop"}
