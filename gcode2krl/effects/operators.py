@@ -42,8 +42,8 @@ def lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
 def delayed(values: Floats, time_s: Floats, delay_s: float) -> Floats:
     """Return y(t) = x(t - delay) of the columns of (m, c), the ends held; x is a cubic between samples.
 
-    Its slopes are those of `lag`. Straight between samples, half a step of delay would bend corners as much as a
-    lag does.
+    Its slopes are those of `lag`. Straight between samples, half a step of delay would bend corners as much
+    as a lag does.
     """
     from scipy.interpolate import CubicHermiteSpline
 
