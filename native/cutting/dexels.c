@@ -360,36 +360,39 @@ static double nearest_share(const Cut *cut, const double *place) {
    first, and its first and last pose only where the tangents there leave something to gain. */
 static void swept(const Cut *cut, int64_t ray, const double *place, Hit *best) {
     const double share = nearest_share(cut, place);
-    Hit near, first, last;
-    hold(cut, place, share, &near);
-    if (!near.hits) {
-        hold(cut, place, 0.0, &first);
-        hold(cut, place, 1.0, &last);
-        *best = first.hits ? first : last;
+    Hit near, outer[2];
+    hold(cut, place, share, best);
+    if (!best->hits) {
+        hold(cut, place, 0.0, &outer[0]);
+        hold(cut, place, 1.0, &outer[1]);
+        if (outer[0].hits || outer[1].hits)
+            *best = outer[outer[0].hits ? 0 : 1];
         for (int end = 0; end < 2 && best->hits; end++) {
-            if (last.hits)
-                gain(&last, end, best);
-            widen(cut, ray, place, end, 0.0, &first, 1.0, &last, best);
+            if (outer[1].hits)
+                gain(&outer[1], end, best);
+            widen(cut, ray, place, end, 0.0, &outer[0], 1.0, &outer[1], best);
         }
         return;
     }
-    *best = near;
-    bool is_held[2] = {false, false};
+    bool is_copied = false, is_held[2] = {false, false};
     for (int end = 0; end < 2; end++)
         for (int side = 0; side < 2; side++) {
-            Hit *outer = side == 0 ? &first : &last;
-            const double ahead = side == 0 ? -share : 1.0 - share;
-            if (ahead == 0.0 || !may_gain(cut, ray, end, best->at[end], bound_of(cut, &near, end, ahead)))
+            const double ahead = (double)side - share;
+            const Hit *known = is_copied ? &near : best;
+            if (ahead == 0.0 || !may_gain(cut, ray, end, best->at[end], bound_of(cut, known, end, ahead)))
                 continue;
+            if (!is_copied)
+                near = *best;
+            is_copied = true;
             if (!is_held[side])
-                hold(cut, place, (double)side, outer);
+                hold(cut, place, (double)side, &outer[side]);
             is_held[side] = true;
-            if (outer->hits)
-                gain(outer, end, best);
+            if (outer[side].hits)
+                gain(&outer[side], end, best);
             if (side == 0)
-                widen(cut, ray, place, end, 0.0, outer, share, &near, best);
+                widen(cut, ray, place, end, 0.0, &outer[0], share, &near, best);
             else
-                widen(cut, ray, place, end, share, &near, 1.0, outer, best);
+                widen(cut, ray, place, end, share, &near, 1.0, &outer[1], best);
         }
 }
 
