@@ -65,7 +65,7 @@ class Dexels(NamedTuple):
         return self._replace(**{name: getattr(self, name).copy() for name in _CUT})
 
     def with_room(self) -> "Dexels":
-        """Return the same with room for twice as many ends; raises where a ray has as many as there may be."""
+        """Return the same with room for twice as many ends; raises where a ray has all that it may have."""
         _refuse_more_than(MOST - 1, self.filled)
         return self._replace(ends=_twice(self.ends), facing=_twice(self.facing))
 
@@ -167,7 +167,7 @@ def _crossed(
 
 
 def _grid(box_mm: Floats, cell_mm: float) -> tuple[Floats, Floats, Ints]:
-    """Return low corner, size (3,) and number (3,) of the cells that fill a box (2, 3); raises for too many."""
+    """Return low corner, size (3,) and number (3,) of cells that fill a box (2, 3); raises for too many."""
     low, high = box_mm
     cells = np.maximum(1, np.ceil((high - low) / cell_mm - 1e-9)).astype(np.int64)
     rays = int(_firsts(cells)[3])
