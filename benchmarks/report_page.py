@@ -2,13 +2,14 @@
 
 ``python benchmarks/report_page.py [--lines 66500] [--five-axes] [--program FILE] [--keep FOLDER]`` predicts
 a raster of so many lines (three samples a line), with five axes one whose tool leans to either side by 15
-degrees, or a program that is there, writes its page and opens it in a headless browser (``--browser /usr/bin/chromium``) through playwright. Printed
-are the time to make the page, its size and what of it is data and libraries, the first paint, the time
-until everything can be used, the volume that the page shows beside that of material removal, frames per
-second while the view turns and while the robot moves along the path, what the quickest frame costs, and how
-long a jump to another second takes until it is drawn, with the part and with the path, with the renderer:
-without a graphics card the browser draws by software on the machine's cores, so that only the same machine
-can be compared. Without playwright or browser the size alone is printed.
+degrees, or a program that is there, writes its page and opens it in a headless browser (``--browser
+/usr/bin/chromium``) through playwright. Printed are the time to make the page, its size and what of it is
+data and libraries, the first paint, the time until everything can be used, the volume that the page shows
+beside that of material removal, frames per second while the view turns and while the robot moves along the
+path, what the quickest frame costs, and how long a jump to another second takes until it is drawn, with the
+part and with the path, with the renderer: without a graphics card the browser draws by software on the
+machine's cores, so that only the same machine can be compared. Without playwright or browser the size alone
+is printed.
 """
 
 import argparse
