@@ -13,12 +13,12 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.drawing import lines_of, look
 from gcode2krl.report.drawing import title as titled
 from gcode2krl.report.part_error import error_on, scale_end
-from gcode2krl.tables import PartHistory, SurfaceHistory
+from gcode2krl.tables import Motion, PartHistory, SurfaceHistory
 
 OFF_COLOURS = "RdBu_r"
 _UNCUT, _UNKNOWN = (0.80, 0.75, 0.63), (0.59, 0.62, 0.65)
@@ -85,7 +85,10 @@ def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -
         for name, set_label in (("X", places[0].set_xlabel), ("Y", places[0].set_ylabel)):
             set_label(f"{name} (mm)" if upright else "Across the tool axis (mm)")
         if known:
-            _list_worst(figure.add_subplot(grid[0, 1]), places[0], prediction, history, off_mm)
+            if prediction.motion is not None:
+                lines = lines_of(prediction.toolpath, prediction.motion)
+                table = figure.add_subplot(grid[0, 1])
+                _list_worst(table, places[0], prediction.motion, lines, history, off_mm)
             label = "Error normal to the surface (mm): above 0 material is left, below 0 too much is cut"
             figure.colorbar(shade, ax=places, label=label, aspect=45, extend="both")
         words = (
@@ -141,14 +144,21 @@ def _draw(axes: Axes, faces: _Faces, side: _Side) -> None:
 
 
 def _list_worst(
-    table: Axes, above: Axes, prediction: Prediction, history: PartHistory | SurfaceHistory, off_mm: Floats
+    table: Axes,
+    above: Axes,
+    motion: Motion,
+    lines: Ints32,
+    history: PartHistory | SurfaceHistory,
+    off_mm: Floats,
 ) -> None:
-    """List the places with the largest errors, and number them in the view from above."""
+    """List the places with the largest errors, and number them in the view from above.
+
+    ``lines`` (m,) of the G-code by sample of the motion.
+    """
     table.set_axis_off()
     table.set_title("Where it is off most", loc="left")
     samples = history.left_by[np.isfinite(off_mm)]
     off_mm = off_mm[np.isfinite(off_mm)]
-    motion, lines = prediction.motion, lines_of(prediction.toolpath, prediction.motion)
     extent_mm = float(np.ptp(motion.position_mm[samples], axis=0).max())
     chosen: list[int] = []
     for row in np.argsort(-np.abs(off_mm), kind="stable").tolist():
@@ -157,7 +167,7 @@ def _list_worst(
             chosen.append(row)
         if len(chosen) == _WORST:
             break
-    rows = [("", "error (mm)", "line", "X", "Y", "Z of the tip (mm)")]
+    rows: list[tuple[str, ...]] = [("", "error (mm)", "line", "X", "Y", "Z of the tip (mm)")]
     for number, row in enumerate(chosen, 1):
         tip, line = motion.position_mm[samples[row]], int(lines[samples[row]])
         rows.append((f"{number}", f"{off_mm[row]:+.3f}", f"{line}", *(f"{at:.1f}" for at in tip)))
