@@ -1,14 +1,15 @@
 """The page of a long raster: its size, the time to its first paint, and frames per second.
 
-``python benchmarks/report_page.py [--lines 66500] [--five-axes] [--keep FOLDER]`` predicts a raster of so
-many lines (three samples a line), with five axes one whose tool leans to either side by 15 degrees, writes
-its page and opens it in a headless browser (``--browser /usr/bin/chromium``) through playwright. Printed
-are the time to make the page, its size and what of it is data and libraries, the first paint, the time
-until everything can be used, the volume that the page shows beside that of material removal, frames per
-second while the view turns and while the robot moves along the path, what the quickest frame costs, and how
-long a jump to another second takes until it is drawn, with the part and with the path, with the renderer:
-without a graphics card the browser draws by software on the machine's cores, so that only the same machine
-can be compared. Without playwright or browser the size alone is printed.
+``python benchmarks/report_page.py [--lines 66500] [--five-axes] [--program FILE] [--keep FOLDER]`` predicts
+a raster of so many lines (three samples a line), with five axes one whose tool leans to either side by 15
+degrees, or a program that is there, writes its page and opens it in a headless browser (``--browser
+/usr/bin/chromium``) through playwright. Printed are the time to make the page, its size and what of it is
+data and libraries, the first paint, the time until everything can be used, the volume that the page shows
+beside that of material removal, frames per second while the view turns and while the robot moves along the
+path, what the quickest frame costs, and how long a jump to another second takes until it is drawn, with the
+part and with the path, with the renderer: without a graphics card the browser draws by software on the
+machine's cores, so that only the same machine can be compared. Without playwright or browser the size alone
+is printed.
 """
 
 import argparse
@@ -113,11 +114,12 @@ def main() -> None:
     asked = arguments()
     with tempfile.TemporaryDirectory() as folder:
         place = Path(asked.keep or folder)
-        part = place / f"raster_{asked.lines}.nc"
-        lines = swung(long_raster(asked.lines)) if asked.five_axes else long_raster(asked.lines)
-        part.write_text("\n".join(lines) + "\n", encoding="ascii")
+        part = asked.program or place / f"raster_{asked.lines}.nc"
+        if not asked.program:
+            lines = swung(long_raster(asked.lines)) if asked.five_axes else long_raster(asked.lines)
+            part.write_text("\n".join(lines) + "\n", encoding="ascii")
         prediction = predict(part, load_cell(FIVE_AXES)) if asked.five_axes else predict(part)
-        file = place / f"raster_{asked.lines}.html"
+        file = place / f"{part.stem}.html"
         start = time.perf_counter()
         history = part_of(prediction)
         events = 0 if history is None else len(history.cell)
@@ -125,7 +127,7 @@ def main() -> None:
         start = time.perf_counter()
         content = content_of(prediction, text=part.read_text(encoding="ascii"), part=history)
         file.write_text(page(content), encoding="utf-8")
-        print(f"{asked.lines} lines, {content.head['all']} samples, {content.head['rows']} drawn")
+        print(f"{part.name}: {content.head['all']} samples, {content.head['rows']} drawn")
         print(f"made in {time.perf_counter() - start:.2f} s")
         say_size(file, len(content.data), len(content.text), len(content.part) + len(content.part_cells))
         browse(file, asked.browser, left_mm3(prediction))
@@ -151,6 +153,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--lines", type=int, default=66_500)
     parser.add_argument("--five-axes", action="store_true")
+    parser.add_argument("--program", metavar="FILE", type=Path, help="instead of a raster")
     parser.add_argument("--browser", default="/usr/bin/chromium")
     parser.add_argument("--keep", metavar="FOLDER", help="leave program and page there")
     return parser.parse_args()

@@ -165,7 +165,7 @@ def test_the_part_is_shown_with_its_error():
     deflection_mm = prediction.deflection.deflection_base_mm[history.left_by[of_cone]]
     assert np.abs(off_mm[of_cone]).max() <= np.linalg.norm(deflection_mm, axis=1).max()
     assert off_mm[of_cone].mean() < -0.5  # the mill is drawn into the cone
-    assert len(prediction.plot.part().axes) == 4  # three sides and the scale
+    assert len(prediction.plot.part().axes) == 5  # three sides, the worst places and the scale
 
 
 def test_a_tilted_tool_leaves_along_its_axis():

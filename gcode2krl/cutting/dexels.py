@@ -5,7 +5,7 @@ material. Each end has the normal of the surface there, so that a surface is kno
 order in a cell: cells may be three times as wide as those of a height field for the same force.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ CELLS_PER_DIAMETER = 32.0
 MAX_RAYS = 8_000_000
 SHORTENED = 127
 """Length of a packed normal."""
-_FEW = 2
 
 
 class Dexels(NamedTuple):
@@ -36,11 +35,17 @@ class Dexels(NamedTuple):
     """
 
     ends: NDArray[np.float32]
-    """(rays, 2k) where material begins and ends, in pairs."""
+    """(e,) where material begins and ends, in pairs; those of a ray are together, from `first` on."""
     facing: Ints32
-    """(rays, 2k) normal of the surface out of the material at each end, three signed bytes; above a stamp."""
+    """(e,) normal of the surface out of the material at each end, three signed bytes; above a stamp."""
+    first: Ints32
+    """(rays,) place of a ray's first end."""
+    room: Ints32
+    """(rays,) stretches for which there is room there."""
     filled: Ints32
     """(rays,) stretches that a ray has."""
+    used: Ints
+    """(1,) ends that belong to rays; a ray that needs more room gets it behind them."""
     bound: NDArray[np.float32]
     """(blocks, 2) lowest and highest end in a block."""
     low_mm: Floats
@@ -60,16 +65,9 @@ class Dexels(NamedTuple):
         return self._replace(**{name: getattr(self, name).copy() for name in _CUT})
 
     def with_room(self) -> "Dexels":
-        """Return the same with room for twice as many stretches on a ray; raises where that is too many."""
-        room = 2 * self.ends.shape[1]
-        if room > 2 * MOST:
-            raise input_error(
-                "stock-large",
-                f"a line through the stock meets material more than {MOST} times",
-                "state a coarser [stock] resolution_mm",
-            )
-        more = ((0, 0), (0, self.ends.shape[1]))
-        return self._replace(ends=np.pad(self.ends, more), facing=np.pad(self.facing, more))
+        """Return the same with room for twice as many ends; raises where a ray has all that it may have."""
+        _refuse_more_than(MOST - 1, self.filled)
+        return self._replace(ends=_twice(self.ends), facing=_twice(self.facing))
 
     def depths(self, places_mm: Floats) -> Floats:
         """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""
@@ -84,8 +82,8 @@ class Dexels(NamedTuple):
         return depth, place
 
 
-DEXELS = StructOf.record(Dexels, written=("ends", "facing", "filled", "bound"))
-_CUT = ("ends", "facing", "filled", "bound")
+_CUT = ("ends", "facing", "first", "room", "filled", "used", "bound")
+DEXELS = StructOf.record(Dexels, written=_CUT)
 _bound = core_function("cutting_bound_dexels", DEXELS)
 _depths = core_function("cutting_depths", DEXELS, FLOATS, FLOAT, OUT_FLOATS)
 _volume = core_function("cutting_dexel_volume", DEXELS, returns=FLOAT)
@@ -99,49 +97,49 @@ def near_of(dexels: Dexels) -> float:
 
 def dexel_block(box_mm: Floats, cell_mm: float) -> Dexels:
     """Return a block (2, 3) as dexels whose cells of about ``cell_mm`` fill it exactly."""
-    empty = _empty(np.asarray(box_mm, dtype=np.float64), cell_mm)
-    firsts = _firsts(empty.cells)
+    low_mm, size_mm, cells = _grid(np.asarray(box_mm, dtype=np.float64), cell_mm)
+    firsts = _firsts(cells)
+    block = _with_ends(low_mm, size_mm, cells, np.ones(firsts[3], dtype=np.int64))
     for axis in range(3):
-        rays = slice(firsts[axis], firsts[axis + 1])
-        empty.ends[rays, :2] = box_mm[0][axis], box_mm[1][axis]
+        ends = slice(2 * firsts[axis], 2 * firsts[axis + 1])
+        block.ends[ends].reshape(-1, 2)[:] = box_mm[0][axis], box_mm[1][axis]
         normals = np.zeros((2, 3))
         normals[:, axis] = -1.0, 1.0
-        empty.facing[rays, :2] = _packed(normals)
-    empty.filled[:] = 1
-    _bound(empty)
-    return empty
+        block.facing[ends].reshape(-1, 2)[:] = _packed(normals)
+    _bound(block)
+    return block
 
 
 def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     """Return a closed mesh as dexels: each ray begins and ends where it passes a triangle."""
-    dexels = _empty(np.array(mesh.bounds, dtype=np.float64), cell_mm)
+    low_mm, size_mm, cells = _grid(np.array(mesh.bounds, dtype=np.float64), cell_mm)
     triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
-    firsts, crossings = _firsts(dexels.cells), []
+    firsts, crossings = _firsts(cells), []
     for axis in range(3):
-        ray, at, normal = _crossed(triangles, axis, dexels)
+        ray, at, normal = _crossed(triangles, axis, low_mm, size_mm, cells)
         crossings.append((ray + firsts[axis], at, normal))
     ray, at, normal = (np.concatenate(column) for column in zip(*crossings, strict=True))
     order = np.lexsort((at, ray))
     ray, at, normal = ray[order], at[order], normal[order]
     count = np.bincount(ray, minlength=firsts[3])
-    while dexels.ends.shape[1] < count.max(initial=0):
-        dexels = dexels.with_room()
-    number = np.arange(len(ray)) - np.repeat(np.cumsum(count) - count, count)
-    dexels.ends[ray, number] = at
-    dexels.facing[ray, number] = _packed(normal)
+    _refuse_more_than(MOST, count // 2)
+    dexels = _with_ends(low_mm, size_mm, cells, -(-count // 2))
     dexels.filled[:] = count // 2
+    place = dexels.first[ray] + np.arange(len(ray)) - np.repeat(np.cumsum(count) - count, count)
+    dexels.ends[place], dexels.facing[place] = at, _packed(normal)
     _bound(dexels)
     return dexels
 
 
-def _crossed(triangles: Floats, axis: int, dexels: Dexels) -> tuple[Ints, Floats, Floats]:
+def _crossed(
+    triangles: Floats, axis: int, low: Floats, size: Floats, cells: Ints
+) -> tuple[Ints, Floats, Floats]:
     """Return rays (c,) of a field, where they pass triangles (t, 3, 3), and the normals (c, 3) there.
 
     A ray on the edge of two triangles passes one of them: points are never on the line of an edge, as rays
     are a little beside the middles of cells, by shares of a cell that no mesh has.
     """
     u, v = (axis + 1) % 3, (axis + 2) % 3
-    low, size, cells = dexels.low_mm, dexels.cell_mm, dexels.cells
     beside = {u: 0.5 + 1.234567e-5, v: 0.5 + 2.345678e-5}
     rays, places, normals = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros((0, 3))]
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -168,7 +166,8 @@ def _crossed(triangles: Floats, axis: int, dexels: Dexels) -> tuple[Ints, Floats
     return np.concatenate(rays), np.concatenate(places), np.concatenate(normals)
 
 
-def _empty(box_mm: Floats, cell_mm: float) -> Dexels:
+def _grid(box_mm: Floats, cell_mm: float) -> tuple[Floats, Floats, Ints]:
+    """Return low corner, size (3,) and number (3,) of cells that fill a box (2, 3); raises for too many."""
     low, high = box_mm
     cells = np.maximum(1, np.ceil((high - low) / cell_mm - 1e-9)).astype(np.int64)
     rays = int(_firsts(cells)[3])
@@ -179,16 +178,43 @@ def _empty(box_mm: Floats, cell_mm: float) -> Dexels:
             f"{rays / 1e6:.0f} million rays at {cell_mm:.3g} mm",
             "state a smaller [stock], or a coarser resolution_mm",
         )
+    return low.copy(), (high - low) / cells, cells
+
+
+def _with_ends(low_mm: Floats, cell_mm: Floats, cells: Ints, stretches: Ints) -> Dexels:
+    """Return dexels whose rays have so many stretches (rays,); ends and bounds are still to be written."""
+    room = np.maximum(stretches, 1)
+    after = 2 * np.cumsum(room)
+    used = int(after[-1])
     blocks = sum(-(-int(cells[(k + 1) % 3]) // SIDE) * -(-int(cells[(k + 2) % 3]) // SIDE) for k in range(3))
     return Dexels(
-        ends=np.zeros((rays, 2 * _FEW), np.float32),
-        facing=np.zeros((rays, 2 * _FEW), np.int32),
-        filled=np.zeros(rays, np.int32),
+        ends=np.zeros(2 * used, np.float32),  # what no ray uses yet takes no memory
+        facing=np.zeros(2 * used, np.int32),
+        first=(after - 2 * room).astype(np.int32),
+        room=room.astype(np.int32),
+        filled=stretches.astype(np.int32),
+        used=np.array([used]),
         bound=np.empty((blocks, 2), np.float32),
-        low_mm=low.copy(),
-        cell_mm=(high - low) / cells,
+        low_mm=low_mm,
+        cell_mm=cell_mm,
         cells=cells,
     )
+
+
+def _twice(ends: NDArray[Any]) -> NDArray[Any]:
+    more = np.zeros(2 * len(ends), ends.dtype)
+    more[: len(ends)] = ends
+    return more
+
+
+def _refuse_more_than(most: int, stretches: NDArray[np.integer[Any]]) -> None:
+    """Raise where a ray has more stretches."""
+    if stretches.max(initial=0) > most:
+        raise input_error(
+            "stock-large",
+            f"a line through the stock meets material more than {most} times",
+            "state a coarser [stock] resolution_mm",
+        )
 
 
 def _firsts(cells: Ints) -> Ints:

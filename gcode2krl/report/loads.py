@@ -42,8 +42,8 @@ def draw_confidence(axes: Axes, time_s: Floats, size: Floats, relative_band: flo
     """Draw the 90 % band of the coefficients about a line."""
     if relative_band <= 0.0:
         return
-    time, low = thin(time_s, size * max(0.0, 1.0 - relative_band))
-    _, high = thin(time_s, size * (1.0 + relative_band))
+    time, drawn = thin(time_s, size)
+    low, high = drawn * max(0.0, 1.0 - relative_band), drawn * (1.0 + relative_band)
     axes.fill_between(time, low, high, color=SKY, alpha=0.35, lw=0.0, label=f"90 %: ± {relative_band:.0%}")
 
 

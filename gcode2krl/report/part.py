@@ -1,4 +1,7 @@
-"""The finished part from three sides as a matplotlib figure, with the error that the deflection leaves."""
+"""The finished part from three sides as a matplotlib figure, with the error that the deflection leaves.
+
+Beside the view from above stands where it is off most, with the lines of G-code.
+"""
 
 from typing import NamedTuple
 
@@ -10,17 +13,19 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.prediction import Prediction
-from gcode2krl.report.drawing import look
+from gcode2krl.report.drawing import lines_of, look
 from gcode2krl.report.drawing import title as titled
 from gcode2krl.report.part_error import error_on, scale_end
-from gcode2krl.tables import PartHistory, SurfaceHistory
+from gcode2krl.tables import Motion, PartHistory, SurfaceHistory
 
 OFF_COLOURS = "RdBu_r"
 _UNCUT, _UNKNOWN = (0.80, 0.75, 0.63), (0.59, 0.62, 0.65)
 _LIGHT = np.array([-1.0, -2.0, 3.0]) / np.sqrt(14.0)
 _LEAST_WEIGHT = 0.02
+_WORST, _APART = 8, 0.08
+"""How many of the worst places are listed, and how far apart they lie, as a share of the way's extent."""
 
 
 class _Side(NamedTuple):
@@ -71,8 +76,8 @@ def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -
         faces, upright = _of_surface(history, colours, weight), True
     with look():
         figure = Figure(figsize=(11.0, 8.5), layout="constrained")
-        grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
-        places = [figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1])]
+        grid = figure.add_gridspec(2, 2)
+        places = [figure.add_subplot(place) for place in (grid[0, 0], grid[1, 0], grid[1, 1])]
         for axes, side in zip(places, _SIDES, strict=True):
             _draw(axes, faces, side)
         if not upright:
@@ -80,6 +85,10 @@ def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -
         for name, set_label in (("X", places[0].set_xlabel), ("Y", places[0].set_ylabel)):
             set_label(f"{name} (mm)" if upright else "Across the tool axis (mm)")
         if known:
+            if prediction.motion is not None:
+                lines = lines_of(prediction.toolpath, prediction.motion)
+                table = figure.add_subplot(grid[0, 1])
+                _list_worst(table, places[0], prediction.motion, lines, history, off_mm)
             label = "Error normal to the surface (mm): above 0 material is left, below 0 too much is cut"
             figure.colorbar(shade, ax=places, label=label, aspect=45, extend="both")
         words = (
@@ -132,6 +141,49 @@ def _draw(axes: Axes, faces: _Faces, side: _Side) -> None:
     if side.tilt_deg < 90.0:
         axes.set_axis_off()
     axes.set_title(side.name, loc="left")
+
+
+def _list_worst(
+    table: Axes,
+    above: Axes,
+    motion: Motion,
+    lines: Ints32,
+    history: PartHistory | SurfaceHistory,
+    off_mm: Floats,
+) -> None:
+    """List the places with the largest errors, and number them in the view from above.
+
+    ``lines`` (m,) of the G-code by sample of the motion.
+    """
+    table.set_axis_off()
+    table.set_title("Where it is off most", loc="left")
+    samples = history.left_by[np.isfinite(off_mm)]
+    off_mm = off_mm[np.isfinite(off_mm)]
+    extent_mm = float(np.ptp(motion.position_mm[samples], axis=0).max())
+    chosen: list[int] = []
+    for row in np.argsort(-np.abs(off_mm), kind="stable").tolist():
+        away = motion.position_mm[samples[chosen]] - motion.position_mm[samples[row]]
+        if (away**2).sum(axis=1).min(initial=np.inf) > (_APART * extent_mm) ** 2:
+            chosen.append(row)
+        if len(chosen) == _WORST:
+            break
+    rows: list[tuple[str, ...]] = [("", "error (mm)", "line", "X", "Y", "Z of the tip (mm)")]
+    for number, row in enumerate(chosen, 1):
+        tip, line = motion.position_mm[samples[row]], int(lines[samples[row]])
+        rows.append((f"{number}", f"{off_mm[row]:+.3f}", f"{line}", *(f"{at:.1f}" for at in tip)))
+        if isinstance(history, PartHistory):
+            tip = history.to_field @ tip
+        above.annotate(
+            f"{number}",
+            tip[:2],
+            ha="center",
+            va="center",
+            fontsize=7,
+            bbox={"boxstyle": "circle,pad=0.2", "facecolor": "white", "linewidth": 0.6},
+        )
+    for place, cells in enumerate(rows):
+        for right, words in zip((0.04, 0.24, 0.4, 0.56, 0.72, 1.0), cells, strict=True):
+            table.text(right, 0.95 - 0.09 * place, words, ha="right", transform=table.transAxes)
 
 
 def _corners(values: Floats) -> Floats:

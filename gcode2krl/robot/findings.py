@@ -185,6 +185,9 @@ def _reach_findings(line: Line, bits: Bits, targets: Targets) -> Iterator[Issue]
 
 
 def _limit_findings(line: Line, q: Floats, bits: Bits, targets: Targets, cell: Cell) -> Iterator[Issue]:
+    remedy = 'move the part, turn the tool about its axis ([frames] spin), or use spin = "auto"'
+    if cell.frames.spin == "auto":
+        remedy = 'move the part ([frames] base): spin = "auto" has found no angle that would do'
     for joint, (low, high) in enumerate(limits_rad(cell) * DEG_PER_RAD):
         for sample in _stretches(bits, 1 << joint):
             yield Issue(
@@ -192,7 +195,7 @@ def _limit_findings(line: Line, q: Floats, bits: Bits, targets: Targets, cell: C
                 "joint-limit",
                 _source_line(line, sample, targets),
                 f"A{joint + 1} at {q[sample, joint] * DEG_PER_RAD:.2f} deg, allowed {low:g}..{high:g}",
-                'move the part, turn the tool about its axis ([frames] spin), or use spin = "auto"',
+                remedy,
             )
 
 

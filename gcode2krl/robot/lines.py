@@ -77,8 +77,8 @@ class _Motions:
     """(p,) samples of each: none for HOME, one for a PTP."""
     start_external: Floats
     end_external: Floats
-    external_s: Floats
-    """(p,) time that the external axes need at least."""
+    needed_s: Floats
+    """(p,) time that the turn of the tool and the external axes need at least."""
 
 
 def _motions(targets: Targets, cell: Cell, rows: Rows) -> _Motions:
@@ -96,9 +96,9 @@ def _motions(targets: Targets, cell: Cell, rows: Rows) -> _Motions:
         angle[turning] = fr.angle_between(end_rotation[turning], start_rotation[turning])
     way = np.maximum(length / STEP_MM, angle / STEP_RAD)
     start_external, end_external = external_starts(targets, rows), targets.external[rows]
-    needed_s = np.broadcast_to(0.0, len(length))
+    needed_s = angle / (cell.controller.vel_ori_deg_s * RAD_PER_DEG)
     if cell.external:
-        needed_s = external_times(end_external - start_external, cell)
+        needed_s = np.maximum(needed_s, external_times(end_external - start_external, cell))
         carried = np.abs(end_external - start_external).max(axis=1) / _STEP_EXTERNAL
         way = np.maximum(way, np.where(ptp, 0.0, carried))
     steps = np.maximum(1, np.ceil(way)).astype(np.int64)
@@ -161,7 +161,7 @@ def _line(targets: Targets, motions: _Motions, rows: Rows, target: Ints, which: 
             external = np.array(external)
             external[on_the_way] = begins + (motions.end_external[way] - begins) * share[:, None]
     time_s = np.maximum(motions.length_mm, 1e-9) / targets.speed_mm_s[rows]
-    time_s = np.maximum(time_s, motions.external_s) / np.maximum(motions.steps, 1)
+    time_s = np.maximum(time_s, motions.needed_s) / np.maximum(motions.steps, 1)
     time_s[targets.ptp[rows]] = np.nan
     tool = targets.tool[rows][which]
     return Line(position, rotation, tool, target, time_s[which], part == 1.0, external)

@@ -21,10 +21,10 @@ a plane parts them from the body at both poses. */
 enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10 };
 
 typedef struct {
-    const Dexels *stock;
+    const Stock *stock;
     const Body *body;
     const Step *step;
-    Field field;
+    const Field *field;
     Pose first, middle, last;
     double low[3], high[3]; /* how far it reaches */
     double fine_mm;         /* where a surface may be beside the swept one */
@@ -36,18 +36,21 @@ typedef struct {
     double at[2], slope[2], normal[2][3];
 } Hit;
 
-Field field_of(const Dexels *stock, int axis) {
-    Field field = {.axis = axis};
-    for (int before = 0; before <= axis; before++) {
-        field.u = (before + 1) % 3;
-        field.v = (before + 2) % 3;
-        field.first += field.columns * field.rows;
-        field.first_block += field.block_columns * ((field.rows + SIDE - 1) / SIDE);
-        field.columns = AT(stock->cells, field.u);
-        field.rows = AT(stock->cells, field.v);
-        field.block_columns = (field.columns + SIDE - 1) / SIDE;
+Stock stock_of(const Dexels *dexels) {
+    Stock stock = {.of = dexels};
+    int64_t rays = 0, blocks = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const int64_t columns = AT(dexels->cells, u), rows = AT(dexels->cells, v);
+        const int64_t block_columns = (columns + SIDE - 1) / SIDE;
+        stock.fields[axis] = (Field){axis, u, v, columns, rows, rays, block_columns, blocks};
+        stock.low[axis] = AT(dexels->low_mm, axis);
+        stock.cell[axis] = AT(dexels->cell_mm, axis);
+        stock.cells[axis] = AT(dexels->cells, axis);
+        rays += columns * rows;
+        blocks += block_columns * ((rows + SIDE - 1) / SIDE);
     }
-    return field;
+    return stock;
 }
 
 Pose pose_at(const Step *step, double share) {
@@ -189,11 +192,11 @@ static bool narrow(double first, double change, double limit, double *low, doubl
 }
 
 /* Hold a ray, through `place` across its axis, against the body at a share of the step. */
-static Hit hold(const Cut *cut, const double *place, double share) {
+static void hold(const Cut *cut, const double *place, double share, Hit *hit) {
     const Body *body = cut->body;
-    const int axis = cut->field.axis, u = cut->field.u, v = cut->field.v;
+    const int axis = cut->field->axis, u = cut->field->u, v = cut->field->v;
     const Pose pose = share == 0.0 ? cut->first : share == 1.0 ? cut->last : pose_at(cut->step, share);
-    Hit hit = {.hits = false};
+    hit->hits = false;
     Seen seen;
     seen.off[axis] = 0.0;
     seen.off[u] = place[u] - pose.tip[u];
@@ -206,30 +209,30 @@ static Hit hold(const Cut *cut, const double *place, double share) {
     seen.c = square - squared(seen.height);
     double ends[2] = {-INFINITY, INFINITY};
     if (!narrow(seen.height, seen.climb, body->top, &ends[0], &ends[1]))
-        return hit;
+        return;
     const double over = seen.c - squared(body->radius);
     if (seen.a > 1e-12) {
         const double root = seen.b * seen.b - seen.a * over;
         if (root <= 0.0)
-            return hit;
+            return;
         ends[0] = greater(ends[0], (-seen.b - sqrt(root)) / seen.a);
         ends[1] = lesser(ends[1], (-seen.b + sqrt(root)) / seen.a);
     } else if (over >= 0.0) {
-        return hit;
+        return;
     }
     if (!(ends[0] < ends[1]))
-        return hit;
+        return;
     double away[2][2];
     if (body->cos_kappa > 0.0 && !begin_on_cone(body, &seen, ends))
-        return hit;
+        return;
     if (body->bottom == 0.0 && body->corner > 0.0 && !begin_on_ball(body, &seen, ends))
-        return hit;
+        return;
     if (!approach(body, &seen, 1.0, ends[1], &ends[0], away[0]) ||
         !approach(body, &seen, -1.0, ends[0], &ends[1], away[1]))
-        return hit;
-    hit.hits = true;
+        return;
+    hit->hits = true;
     for (int end = 0; end < 2; end++) {
-        double *normal = hit.normal[end], move = 0.0;
+        double *normal = hit->normal[end], move = 0.0;
         seen.off[axis] = ends[end];
         const double height = seen.height + ends[end] * seen.climb;
         const double radius = sqrt(greater((seen.a * ends[end] + 2.0 * seen.b) * ends[end] + seen.c, 1e-18));
@@ -238,16 +241,15 @@ static Hit hold(const Cut *cut, const double *place, double share) {
             normal[k] = away[end][0] * (seen.off[k] - height * pose.axis[k]) / radius + away[end][1] * pose.axis[k];
             move += normal[k] * (cut->step->way[k] + cut->step->turn[k] * height - pose.axis[k] * turns);
         }
-        hit.at[end] = pose.tip[axis] + ends[end];
-        hit.slope[end] = fabs(normal[axis]) < GRAZES ? 0.0 : move / normal[axis];
+        hit->at[end] = pose.tip[axis] + ends[end];
+        hit->slope[end] = fabs(normal[axis]) < GRAZES ? 0.0 : move / normal[axis];
     }
-    return hit;
 }
 
 /* Write the normal of the surface that a step leaves between two poses: that of the two normals there which is across the
    way. A sharp edge leaves a surface that is neither of its own sides. */
 static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double *normal) {
-    const int axis = cut->field.axis;
+    const int axis = cut->field->axis;
     const double *a = from->normal[end], *b = to->normal[end];
     const double of_b = fabs(from->slope[end] * a[axis]), of_a = fabs(to->slope[end] * b[axis]);
     if (!(of_a + of_b > 0.0) || (from->slope[end] > 0.0) == (to->slope[end] > 0.0))
@@ -264,105 +266,134 @@ static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double
 /* Tell whether a ray has material between two places on it, in either order. */
 static bool has_between(const Cut *cut, int64_t ray, double a, double b) {
     const double low = lesser(a, b) - cut->fine_mm, high = greater(a, b) + cut->fine_mm;
-    for (int64_t k = 0; k < AT(cut->stock->filled, ray); k++)
-        if (CELL(cut->stock->ends, ray, 2 * k) < high && CELL(cut->stock->ends, ray, 2 * k + 1) > low)
+    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++)
+        if (*end_at(cut->stock, ray, 2 * k) < high && *end_at(cut->stock, ray, 2 * k + 1) > low)
             return true;
     return false;
 }
 
-/* Tell whether a ray has material as far as the step may reach on it, by the tangents at one pose, `ahead` of which (1, -1)
-   the step lies: what is covered begins no earlier and ends no later than they say. */
-static bool is_in_reach(const Cut *cut, int64_t ray, const Hit *hit, double ahead) {
-    const int axis = cut->field.axis;
-    if (fabs(hit->normal[0][axis]) < PARALLEL || fabs(hit->normal[1][axis]) < PARALLEL)
-        return true;
-    return has_between(cut, ray, hit->at[0] + lesser(ahead * hit->slope[0], 0.0),
-                       hit->at[1] + greater(ahead * hit->slope[1], 0.0));
+/* Return where a step leads to at most on a ray, by the tangent at a pose: entry (0) comes no earlier, exit (1) no later than
+   that, a share of the step `ahead` of the pose (behind it: negative). */
+static double bound_of(const Cut *cut, const Hit *hit, int end, double ahead) {
+    const double sense = end == 0 ? 1.0 : -1.0;
+    if (fabs(hit->normal[end][cut->field->axis]) < PARALLEL)
+        return -sense * INFINITY;
+    return hit->at[end] + sense * lesser(sense * hit->slope[end] * ahead, 0.0);
+}
+
+/* Tell whether there is something to gain between the end that is known and a bound of it. */
+static bool may_gain(const Cut *cut, int64_t ray, int end, double known, double bound) {
+    const double sense = end == 0 ? 1.0 : -1.0;
+    return (known - bound) * sense >= cut->fine_mm && has_between(cut, ray, bound, known);
+}
+
+static void gain(const Hit *here, int end, Hit *best) {
+    const double sense = end == 0 ? 1.0 : -1.0;
+    if ((here->at[end] - best->at[end]) * sense < 0.0) {
+        best->at[end] = here->at[end];
+        copy3(here->normal[end], best->normal[end]);
+    }
 }
 
 /* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
    whose slopes say that it lies between them. A pose that misses has none. */
-static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, Hit from, double b, Hit to, Hit *best) {
+static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, const Hit *at_a, double b,
+                  const Hit *at_b, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
+    Hit room[3]; /* two poses that are held against the ray, and the one that is tried */
+    const Hit *from = at_a, *to = at_b;
+    Hit *here = &room[0];
     bool is_between = false;
     for (int round = 0; round < MOST_HALVINGS; round++) {
-        if ((from.hits && from.slope[end] * sense >= 0.0) || (to.hits && to.slope[end] * sense <= 0.0))
+        if ((from->hits && from->slope[end] * sense >= 0.0) || (to->hits && to->slope[end] * sense <= 0.0))
             break;
         double share = 0.5 * (a + b);
-        if (from.hits && to.hits) { /* where the tangents meet: exact at a kink and on a parabola; none is beyond */
-            const double meet = to.at[end] - from.at[end] - to.slope[end] * (b - a);
-            const double after = clamped(meet / (from.slope[end] - to.slope[end]), 0.02 * (b - a), 0.98 * (b - a));
-            const double bound = from.at[end] + from.slope[end] * after;
-            if ((best->at[end] - bound) * sense < cut->fine_mm || !has_between(cut, ray, bound, best->at[end]))
+        if (from->hits && to->hits) { /* where the tangents meet: none is beyond */
+            const double steeper = from->slope[end] - to->slope[end];
+            const double meets = (to->at[end] - from->at[end] - to->slope[end] * (b - a)) / steeper;
+            if (!may_gain(cut, ray, end, best->at[end], from->at[end] + from->slope[end] * clamped(meets, 0.0, b - a)))
                 break;
-            share = a + after;
+            /* that is the place on a kink; on a parabola it is where the slope, which changes evenly, is 0 */
+            const double after = round % 2 ? meets : (b - a) * from->slope[end] / steeper;
+            share = a + clamped(after, 0.02 * (b - a), 0.98 * (b - a));
+        } else if (from->hits || to->hits) {
+            const Hit *known = from->hits ? from : to;
+            if (!may_gain(cut, ray, end, best->at[end], bound_of(cut, known, end, from->hits ? b - a : a - b)))
+                break;
         }
-        const Hit here = hold(cut, place, share);
-        if (!here.hits && !from.hits && !to.hits)
-            return;
-        is_between = is_between || here.hits;
-        if (here.hits && (!best->hits || (here.at[end] - best->at[end]) * sense < 0.0)) {
-            best->at[end] = here.at[end];
-            copy3(here.normal[end], best->normal[end]);
+        hold(cut, place, share, here);
+        if (here->hits) {
+            is_between = true;
+            gain(here, end, best);
         }
-        const bool is_before = here.hits ? here.slope[end] * sense < 0.0 : !from.hits;
-        if (is_before) {
+        if (here->hits ? here->slope[end] * sense < 0.0 : !from->hits) {
             a = share;
             from = here;
         } else {
             b = share;
             to = here;
         }
+        for (int k = 0; k < 3; k++)
+            if (&room[k] != from && &room[k] != to)
+                here = &room[k];
     }
-    if (is_between && from.hits && to.hits)
-        face(cut, end, &from, &to, best->normal[end]);
+    if (is_between && from->hits && to->hits)
+        face(cut, end, from, to, best->normal[end]);
 }
 
-/* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray. */
+/* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray; its end where that is
+   the same all the way. */
 static double nearest_share(const Cut *cut, const double *place) {
-    const int u = cut->field.u, v = cut->field.v;
+    const int u = cut->field->u, v = cut->field->v;
     const Pose *middle = &cut->middle;
     const double low = cut->body->corner, high = cut->body->top;
     const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
     const double off_u = place[u] - middle->tip[u], off_v = place[v] - middle->tip[v];
-    const double across = way_u * middle->axis[v] - way_v * middle->axis[u];
-    double share = 0.0, up = low, square = way_u * way_u + way_v * way_v;
-    if (fabs(across) > 1e-6)
-        up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
-    if (square > 1e-12)
-        share = ((off_u - up * middle->axis[u]) * way_u + (off_v - up * middle->axis[v]) * way_v) / square;
-    return clamped(0.5 + share, 0.0, 1.0);
+    const double across = way_u * middle->axis[v] - way_v * middle->axis[u], square = way_u * way_u + way_v * way_v;
+    if (square < 1e-12 || fabs(across) < 1e-6 * sqrt(square))
+        return 1.0;
+    const double up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
+    return clamped(0.5 + ((off_u - up * middle->axis[u]) * way_u + (off_v - up * middle->axis[v]) * way_v) / square, 0.0, 1.0);
 }
 
-/* Return what the whole step covers on a ray. */
-static Hit swept(const Cut *cut, int64_t ray, const double *place) {
-    const Hit from = hold(cut, place, 0.0);
-    if (cut->step->follows && from.hits && from.slope[0] >= 0.0 && from.slope[1] <= 0.0)
-        return (Hit){.hits = false}; /* it only leaves the ray: what it covers is cut */
-    if (from.hits && !is_in_reach(cut, ray, &from, 1.0))
-        return (Hit){.hits = false};
-    const Hit to = hold(cut, place, 1.0);
-    if (to.hits && !is_in_reach(cut, ray, &to, -1.0))
-        return (Hit){.hits = false};
-    Hit best = from.hits ? from : to;
-    if (!best.hits) {
-        const double share = nearest_share(cut, place);
-        const Hit here = best = hold(cut, place, share);
-        for (int end = 0; end < 2 && here.hits; end++) {
-            widen(cut, ray, place, end, 0.0, from, share, here, &best);
-            widen(cut, ray, place, end, share, here, 1.0, to, &best);
+/* Write what the whole step covers on a ray, as far as there is material: the pose whose axis is nearest to it is held against it
+   first, and its first and last pose only where the tangents there leave something to gain. */
+static void swept(const Cut *cut, int64_t ray, const double *place, Hit *best) {
+    const double share = nearest_share(cut, place);
+    Hit near, outer[2];
+    hold(cut, place, share, best);
+    if (!best->hits) {
+        hold(cut, place, 0.0, &outer[0]);
+        hold(cut, place, 1.0, &outer[1]);
+        if (outer[0].hits || outer[1].hits)
+            *best = outer[outer[0].hits ? 0 : 1];
+        for (int end = 0; end < 2 && best->hits; end++) {
+            if (outer[1].hits)
+                gain(&outer[1], end, best);
+            widen(cut, ray, place, end, 0.0, &outer[0], 1.0, &outer[1], best);
         }
-        return best;
+        return;
     }
-    for (int end = 0; end < 2; end++) {
-        const double sense = end == 0 ? 1.0 : -1.0;
-        if (from.hits && to.hits && (to.at[end] - from.at[end]) * sense < 0.0) {
-            best.at[end] = to.at[end];
-            copy3(to.normal[end], best.normal[end]);
+    bool is_copied = false, is_held[2] = {false, false};
+    for (int end = 0; end < 2; end++)
+        for (int side = 0; side < 2; side++) {
+            const double ahead = (double)side - share;
+            const Hit *known = is_copied ? &near : best;
+            if (ahead == 0.0 || !may_gain(cut, ray, end, best->at[end], bound_of(cut, known, end, ahead)))
+                continue;
+            if (!is_copied)
+                near = *best;
+            is_copied = true;
+            if (!is_held[side])
+                hold(cut, place, (double)side, &outer[side]);
+            is_held[side] = true;
+            if (outer[side].hits)
+                gain(&outer[side], end, best);
+            if (side == 0)
+                widen(cut, ray, place, end, 0.0, &outer[0], share, &near, best);
+            else
+                widen(cut, ray, place, end, share, &near, 1.0, &outer[1], best);
         }
-        widen(cut, ray, place, end, 0.0, from, 1.0, to, &best);
-    }
-    return best;
 }
 
 static int32_t packed(const double *normal, int32_t stamp) {
@@ -372,17 +403,29 @@ static int32_t packed(const double *normal, int32_t stamp) {
     return (int32_t)bits;
 }
 
+/* Give a ray room for so many stretches, behind all others where it has less; return false where there is none. */
+static bool has_room(const Dexels *dexels, int64_t ray, int64_t wanted) {
+    if (wanted <= AT(dexels->room, ray))
+        return true;
+    const int64_t room = 2 * (int64_t)AT(dexels->room, ray), used = AT(dexels->used, 0);
+    if (wanted > TD_MOST || used + 2 * room > dexels->ends.rows)
+        return false;
+    AT(dexels->first, ray) = (int32_t)used;
+    AT(dexels->room, ray) = (int32_t)room;
+    AT(dexels->used, 0) = used + 2 * room;
+    return true;
+}
+
 /* Take what is covered out of a ray, and put a stamp on the ends that it gets; return false where it has no room. */
-static bool take(const Dexels *stock, int64_t ray, const Hit *hit, int32_t stamp, double *longest) {
-    const int64_t most_ends = stock->ends.columns;
+static bool take(const Stock *stock, int64_t ray, const Hit *hit, int32_t stamp, double *longest) {
     const float low = (float)hit->at[0], high = (float)hit->at[1];
-    const int64_t count = AT(stock->filled, ray);
+    const int64_t count = AT(stock->of->filled, ray);
     int64_t left = 0;
     float ends[2 * TD_MOST + 2];
     int32_t facing[2 * TD_MOST + 2];
     for (int64_t k = 0; k < count; k++) {
-        const float a = CELL(stock->ends, ray, 2 * k), b = CELL(stock->ends, ray, 2 * k + 1);
-        const int32_t at_a = CELL(stock->facing, ray, 2 * k), at_b = CELL(stock->facing, ray, 2 * k + 1);
+        const float a = *end_at(stock, ray, 2 * k), b = *end_at(stock, ray, 2 * k + 1);
+        const int32_t at_a = *facing_at(stock, ray, 2 * k), at_b = *facing_at(stock, ray, 2 * k + 1);
         const bool is_before = low - a > (float)THIN_MM, is_behind = b - high > (float)THIN_MM;
         const float cut = (b < high ? b : high) - (a > low ? a : low);
         if (!(cut > (float)THIN_MM)) {
@@ -406,13 +449,13 @@ static bool take(const Dexels *stock, int64_t ray, const Hit *hit, int32_t stamp
             facing[2 * left++ + 1] = at_b;
         }
     }
-    if (2 * left > most_ends)
+    if (!has_room(stock->of, ray, left))
         return false;
     for (int64_t k = 0; k < 2 * left; k++) {
-        CELL(stock->ends, ray, k) = ends[k];
-        CELL(stock->facing, ray, k) = facing[k];
+        *end_at(stock, ray, k) = ends[k];
+        *facing_at(stock, ray, k) = facing[k];
     }
-    AT(stock->filled, ray) = (int32_t)left;
+    AT(stock->of->filled, ray) = (int32_t)left;
     return true;
 }
 
@@ -443,36 +486,36 @@ static bool is_parted(const Cut *cut, const double *low, const double *high) {
 }
 
 /* A range of cells along an axis: those whose middle lies between two coordinates. */
-static void cells_in(const Dexels *stock, int axis, double low, double high, int64_t *first, int64_t *after) {
-    const double origin = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis);
+static void cells_in(const Stock *stock, int axis, double low, double high, int64_t *first, int64_t *after) {
+    const double origin = stock->low[axis], size = stock->cell[axis];
     *first = most((int64_t)ceil((low - origin) / size - 0.5), 0);
-    *after = least((int64_t)floor((high - origin) / size - 0.5) + 1, AT(stock->cells, axis));
+    *after = least((int64_t)floor((high - origin) / size - 0.5) + 1, stock->cells[axis]);
 }
 
 /* Compute the bound of a block again: lowest and highest end. */
-static void bound_block(const Dexels *stock, const Field *field, int64_t row, int64_t column) {
+static void bound_block(const Stock *stock, const Field *field, int64_t row, int64_t column) {
     float low = INFINITY, high = -INFINITY;
     for (int64_t i = row * SIDE; i < least((row + 1) * SIDE, field->rows); i++)
         for (int64_t j = column * SIDE; j < least((column + 1) * SIDE, field->columns); j++) {
-            const int64_t ray = field->first + i * field->columns + j, count = AT(stock->filled, ray);
+            const int64_t ray = field->first + i * field->columns + j, count = AT(stock->of->filled, ray);
             if (count == 0)
                 continue;
-            const float first = CELL(stock->ends, ray, 0), last = CELL(stock->ends, ray, 2 * count - 1);
+            const float first = *end_at(stock, ray, 0), last = *end_at(stock, ray, 2 * count - 1);
             low = first < low ? first : low;
             high = last > high ? last : high;
         }
     const int64_t block = field->first_block + row * field->block_columns + column;
-    CELL(stock->bound, block, 0) = low;
-    CELL(stock->bound, block, 1) = high;
+    CELL(stock->of->bound, block, 0) = low;
+    CELL(stock->of->bound, block, 1) = high;
 }
 
 /* Return whether a ray has material where the body reaches; widen the bounds of it. */
 static bool is_reached(const Cut *cut, int64_t ray, double *low, double *high) {
-    const int axis = cut->field.axis;
+    const int axis = cut->field->axis;
     bool is = false;
-    for (int64_t k = 0; k < AT(cut->stock->filled, ray); k++) {
-        const double a = greater(CELL(cut->stock->ends, ray, 2 * k), cut->low[axis]);
-        const double b = lesser(CELL(cut->stock->ends, ray, 2 * k + 1), cut->high[axis]);
+    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++) {
+        const double a = greater(*end_at(cut->stock, ray, 2 * k), cut->low[axis]);
+        const double b = lesser(*end_at(cut->stock, ray, 2 * k + 1), cut->high[axis]);
         if (b - a > THIN_MM) {
             *low = lesser(*low, a);
             *high = greater(*high, b);
@@ -484,12 +527,12 @@ static bool is_reached(const Cut *cut, int64_t ray, double *low, double *high) {
 
 /* Cut the rays of a block within ranges of cells; return false where one has no room. */
 static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t *u, const int64_t *v, double *longest) {
-    const Dexels *stock = cut->stock;
-    const Field *field = &cut->field;
+    const Stock *stock = cut->stock;
+    const Field *field = cut->field;
     const int64_t block = field->first_block + row * field->block_columns + column;
     const int64_t i0 = most(row * SIDE, v[0]), i1 = least((row + 1) * SIDE, v[1]);
     const int64_t j0 = most(column * SIDE, u[0]), j1 = least((column + 1) * SIDE, u[1]);
-    if (CELL(stock->bound, block, 0) >= cut->high[field->axis] || CELL(stock->bound, block, 1) <= cut->low[field->axis])
+    if (CELL(stock->of->bound, block, 0) >= cut->high[field->axis] || CELL(stock->of->bound, block, 1) <= cut->low[field->axis])
         return true;
     double low[3], high[3], place[3] = {0.0, 0.0, 0.0};
     bool is_in[SIDE * SIDE], has_room = true;
@@ -511,7 +554,8 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
             place[field->u] = middle_of(stock, field->u, j);
             place[field->v] = middle_of(stock, field->v, i);
             const int64_t ray = field->first + i * field->columns + j;
-            const Hit hit = swept(cut, ray, place);
+            Hit hit;
+            swept(cut, ray, place, &hit);
             if (hit.hits)
                 has_room = take(stock, ray, &hit, cut->step->stamp, longest);
         }
@@ -520,8 +564,8 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
 }
 
 /* Take a step out of the stock: see dexels.h. */
-bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm) {
-    Cut cut = {.stock = stock, .body = body, .step = step, .fine_mm = FINE * AT(stock->cell_mm, 0)};
+bool cut_out(const Stock *stock, const Body *body, const Step *step, double *removed_mm) {
+    Cut cut = {.stock = stock, .body = body, .step = step, .fine_mm = FINE * stock->cell[0]};
     cut.first = pose_at(step, 0.0);
     cut.middle = pose_at(step, 0.5);
     cut.last = pose_at(step, 1.0);
@@ -535,8 +579,8 @@ bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *re
         cells_in(stock, axis, cut.low[axis], cut.high[axis], &cells[axis][0], &cells[axis][1]);
     }
     for (int axis = 0; axis < 3; axis++) {
-        cut.field = field_of(stock, axis);
-        const int64_t *u = cells[cut.field.u], *v = cells[cut.field.v];
+        cut.field = &stock->fields[axis];
+        const int64_t *u = cells[cut.field->u], *v = cells[cut.field->v];
         if (u[0] >= u[1] || v[0] >= v[1])
             continue;
         for (int64_t row = v[0] / SIDE; row <= (v[1] - 1) / SIDE; row++)
@@ -548,27 +592,27 @@ bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *re
 }
 
 /* The cell of a coordinate, the nearest one where it lies outside. */
-static int64_t cell_of(const Dexels *stock, int axis, double at) {
-    const double cell = floor((at - AT(stock->low_mm, axis)) / AT(stock->cell_mm, axis));
-    return (int64_t)clamped(cell, 0.0, (double)(AT(stock->cells, axis) - 1));
+static int64_t cell_of(const Stock *stock, int axis, double at) {
+    const double cell = floor((at - stock->low[axis]) / stock->cell[axis]);
+    return (int64_t)clamped(cell, 0.0, (double)(stock->cells[axis] - 1));
 }
 
-double depth_at(const Dexels *stock, const double *place, double near_mm) {
+double depth_at(const Stock *stock, const double *place, double near_mm) {
     double best = 0.0, nearest_square = INFINITY, beyond = -INFINITY; /* of the box */
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
-        const double low = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis) * (double)AT(stock->cells, axis);
+        const double low = stock->low[axis], size = stock->cell[axis] * (double)stock->cells[axis];
         beyond = greater(beyond, greater(low - place[axis], place[axis] - low - size));
         if (beyond > near_mm)
             return -near_mm;
         cell[axis] = cell_of(stock, axis, place[axis]);
     }
     for (int axis = 0; axis < 3; axis++) {
-        const Field field = field_of(stock, axis);
-        const int64_t ray = field.first + cell[field.v] * field.columns + cell[field.u], count = AT(stock->filled, ray);
+        const Field *field = &stock->fields[axis];
+        const int64_t ray = field->first + cell[field->v] * field->columns + cell[field->u], count = AT(stock->of->filled, ray);
         int64_t after = 0; /* the first end behind the place */
-        while (after < 2 * count && CELL(stock->ends, ray, after) <= (float)place[axis])
+        while (after < 2 * count && *end_at(stock, ray, after) <= (float)place[axis])
             after++;
         inside += after % 2;
         double own = 0.0, own_square = INFINITY;
@@ -576,13 +620,13 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
             if (end < 0 || end >= 2 * count)
                 continue;
             double off[3], depth = 0.0;
-            off[axis] = place[axis] - CELL(stock->ends, ray, end);
-            const int32_t facing = CELL(stock->facing, ray, end);
+            off[axis] = place[axis] - *end_at(stock, ray, end);
+            const int32_t facing = *facing_at(stock, ray, end);
             const double steep = fabs(unpacked(facing, axis));
             if (fabs(off[axis]) * steep > 1.5 * near_mm)
                 continue;
-            off[field.u] = place[field.u] - middle_of(stock, field.u, cell[field.u]);
-            off[field.v] = place[field.v] - middle_of(stock, field.v, cell[field.v]);
+            off[field->u] = place[field->u] - middle_of(stock, field->u, cell[field->u]);
+            off[field->v] = place[field->v] - middle_of(stock, field->v, cell[field->v]);
             for (int k = 0; k < 3; k++)
                 depth -= unpacked(facing, k) * off[k];
             if (fabs(depth) > near_mm)
@@ -602,10 +646,10 @@ double depth_at(const Dexels *stock, const double *place, double near_mm) {
     return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
 
-double highest_near(const Dexels *stock, double x, double y, double radius) {
-    const Field field = field_of(stock, 2);
+double highest_near(const Stock *stock, double x, double y, double radius) {
+    const Field *field = &stock->fields[2];
     int64_t u[2], v[2];
-    const double wide_x = radius + AT(stock->cell_mm, 0), wide_y = radius + AT(stock->cell_mm, 1);
+    const double wide_x = radius + stock->cell[0], wide_y = radius + stock->cell[1];
     cells_in(stock, 0, x - wide_x, x + wide_x, &u[0], &u[1]);
     cells_in(stock, 1, y - wide_y, y + wide_y, &v[0], &v[1]);
     float top = -INFINITY;
@@ -613,30 +657,32 @@ double highest_near(const Dexels *stock, double x, double y, double radius) {
         return top;
     for (int64_t row = v[0] / SIDE; row <= (v[1] - 1) / SIDE; row++)
         for (int64_t column = u[0] / SIDE; column <= (u[1] - 1) / SIDE; column++) {
-            const float high = CELL(stock->bound, field.first_block + row * field.block_columns + column, 1);
+            const float high = CELL(stock->of->bound, field->first_block + row * field->block_columns + column, 1);
             top = high > top ? high : top;
         }
     return top;
 }
 
 /* Compute the bounds of all blocks. */
-EXPORT void cutting_bound_dexels(const Dexels *stock) {
+EXPORT void cutting_bound_dexels(const Dexels *dexels) {
+    const Stock stock = stock_of(dexels);
     for (int axis = 0; axis < 3; axis++) {
-        const Field field = field_of(stock, axis);
-        for (int64_t row = 0; row * SIDE < field.rows; row++)
-            for (int64_t column = 0; column * SIDE < field.columns; column++)
-                bound_block(stock, &field, row, column);
+        const Field *field = &stock.fields[axis];
+        for (int64_t row = 0; row * SIDE < field->rows; row++)
+            for (int64_t column = 0; column * SIDE < field->columns; column++)
+                bound_block(&stock, field, row, column);
     }
 }
 
 /* Return the volume of the material: of each cell the share below the surface next to its middle. */
-EXPORT double cutting_dexel_volume(const Dexels *stock) {
-    const double size = lesser(AT(stock->cell_mm, 0), lesser(AT(stock->cell_mm, 1), AT(stock->cell_mm, 2)));
-    const double cell = AT(stock->cell_mm, 0) * AT(stock->cell_mm, 1) * AT(stock->cell_mm, 2);
+EXPORT double cutting_dexel_volume(const Dexels *dexels) {
+    const Stock all = stock_of(dexels), *stock = &all;
+    const double size = lesser(stock->cell[0], lesser(stock->cell[1], stock->cell[2]));
+    const double cell = stock->cell[0] * stock->cell[1] * stock->cell[2];
     double cells = 0.0;
-    for (int64_t k = 0; k < AT(stock->cells, 2); k++)
-        for (int64_t j = 0; j < AT(stock->cells, 1); j++)
-            for (int64_t i = 0; i < AT(stock->cells, 0); i++) {
+    for (int64_t k = 0; k < stock->cells[2]; k++)
+        for (int64_t j = 0; j < stock->cells[1]; j++)
+            for (int64_t i = 0; i < stock->cells[0]; i++) {
                 const double middle[3] = {middle_of(stock, 0, i), middle_of(stock, 1, j), middle_of(stock, 2, k)};
                 cells += clamped(0.5 + depth_at(stock, middle, 2.0 * size) / size, 0.0, 1.0);
             }
@@ -644,8 +690,9 @@ EXPORT double cutting_dexel_volume(const Dexels *stock) {
 }
 
 /* Write how deep capsules (n, 6), radii (n), are in the material at most, 0 where they are not, and where. */
-EXPORT void cutting_bodies_dexels(const Dexels *stock, Floats ends_mm, Floats radius_mm, Floats depth_mm, Floats place_mm) {
-    const Field field = field_of(stock, 2);
+EXPORT void cutting_bodies_dexels(const Dexels *dexels, Floats ends_mm, Floats radius_mm, Floats depth_mm, Floats place_mm) {
+    const Stock all = stock_of(dexels), *stock = &all;
+    const Field *field = &stock->fields[2];
     for (int64_t n = 0; n < ends_mm.rows; n++) {
         const double *a = &CELL(ends_mm, n, 0), *b = a + 3, wide = AT(radius_mm, n);
         int64_t u[2], v[2];
@@ -656,10 +703,10 @@ EXPORT void cutting_bodies_dexels(const Dexels *stock, Floats ends_mm, Floats ra
             CELL(place_mm, n, k) = NAN;
         for (int64_t i = v[0]; i < v[1]; i++)
             for (int64_t j = u[0]; j < u[1]; j++) {
-                const int64_t ray = i * field.columns + j + field.first;
+                const int64_t ray = i * field->columns + j + field->first;
                 const double x = middle_of(stock, 0, j), y = middle_of(stock, 1, i);
-                for (int64_t k = 0; k < AT(stock->filled, ray); k++) {
-                    const double low = CELL(stock->ends, ray, 2 * k), high = CELL(stock->ends, ray, 2 * k + 1);
+                for (int64_t k = 0; k < AT(stock->of->filled, ray); k++) {
+                    const double low = *end_at(stock, ray, 2 * k), high = *end_at(stock, ray, 2 * k + 1);
                     if (high <= lesser(a[2], b[2]) - wide || low >= greater(a[2], b[2]) + wide)
                         continue;
                     const double stretch[6] = {x, y, low, x, y, high};
@@ -675,7 +722,8 @@ EXPORT void cutting_bodies_dexels(const Dexels *stock, Floats ends_mm, Floats ra
 }
 
 /* Write how deep places (n, 3) are in material, to `near_mm`. */
-EXPORT void cutting_depths(const Dexels *stock, Floats places_mm, double near_mm, Floats depth_mm) {
+EXPORT void cutting_depths(const Dexels *dexels, Floats places_mm, double near_mm, Floats depth_mm) {
+    const Stock stock = stock_of(dexels);
     for (int64_t i = 0; i < places_mm.rows; i++)
-        AT(depth_mm, i) = depth_at(stock, &CELL(places_mm, i, 0), near_mm);
+        AT(depth_mm, i) = depth_at(&stock, &CELL(places_mm, i, 0), near_mm);
 }

@@ -36,11 +36,27 @@ typedef struct {
     int64_t columns, rows, first, block_columns, first_block;
 } Field;
 
-Field field_of(const Dexels *stock, int axis);
+/* Dexels with what is looked up for each ray: the three fields, the low corner, the size of a cell and their number. */
+typedef struct {
+    const Dexels *of;
+    Field fields[3];
+    double low[3], cell[3];
+    int64_t cells[3];
+} Stock;
+
+Stock stock_of(const Dexels *dexels);
 
 /* Return a coordinate of the middle of a cell. */
-static inline double middle_of(const Dexels *stock, int axis, int64_t cell) {
-    return AT(stock->low_mm, axis) + ((double)cell + 0.5) * AT(stock->cell_mm, axis);
+static inline double middle_of(const Stock *stock, int axis, int64_t cell) {
+    return stock->low[axis] + ((double)cell + 0.5) * stock->cell[axis];
+}
+
+/* Return an end on a ray, and what is packed there. */
+static inline float *end_at(const Stock *stock, int64_t ray, int64_t k) {
+    return &AT(stock->of->ends, AT(stock->of->first, ray) + k);
+}
+static inline int32_t *facing_at(const Stock *stock, int64_t ray, int64_t k) {
+    return &AT(stock->of->facing, AT(stock->of->first, ray) + k);
 }
 
 /* Return a coordinate of the normal at an end of a ray, and its stamp. */
@@ -66,12 +82,12 @@ double reach_of(const Body *body, const Pose *pose, const double *along);
 
 /* Take a step of a body out of the stock; raise `removed_mm` (3) to the longest stretch taken from a ray of each field. Returns
    false where a ray has no room for another stretch: the step is then to be done again. */
-bool cut_out(const Dexels *stock, const Body *body, const Step *step, double *removed_mm);
+bool cut_out(const Stock *stock, const Body *body, const Step *step, double *removed_mm);
 
 /* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side. */
-double depth_at(const Dexels *stock, const double *place, double near_mm);
+double depth_at(const Stock *stock, const double *place, double near_mm);
 
 /* Return a height that no material within a radius in plan is above. */
-double highest_near(const Dexels *stock, double x, double y, double radius);
+double highest_near(const Stock *stock, double x, double y, double radius);
 
 #endif

@@ -33,33 +33,33 @@ typedef struct {
     int32_t facing, stamp;
 } End;
 
-static int64_t number_of(const Dexels *stock, const int64_t *at, int64_t more) {
-    return at[0] + (AT(stock->cells, 0) + more) * (at[1] + (AT(stock->cells, 1) + more) * at[2]);
+static int64_t number_of(const Stock *stock, const int64_t *at, int64_t more) {
+    return at[0] + (stock->cells[0] + more) * (at[1] + (stock->cells[1] + more) * at[2]);
 }
 
-static uint8_t *solid_at(const Dexels *stock, const Surface *surface, const int64_t *middle) {
+static uint8_t *solid_at(const Stock *stock, const Surface *surface, const int64_t *middle) {
     return &AT(surface->solid, number_of(stock, middle, 2));
 }
 
 /* Return the ray along an axis through a middle, of which those in the stock are counted from 1. */
-static int64_t ray_of(const Dexels *stock, int axis, const int64_t *middle) {
-    const Field field = field_of(stock, axis);
-    return field.first + (middle[field.v] - 1) * field.columns + middle[field.u] - 1;
+static int64_t ray_of(const Stock *stock, int axis, const int64_t *middle) {
+    const Field *field = &stock->fields[axis];
+    return field->first + (middle[field->v] - 1) * field->columns + middle[field->u] - 1;
 }
 
-static bool has_at(const Dexels *stock, int64_t ray, double place) {
-    for (int64_t k = 0; k < AT(stock->filled, ray); k++)
-        if (CELL(stock->ends, ray, 2 * k) <= place && place < CELL(stock->ends, ray, 2 * k + 1))
+static bool has_at(const Stock *stock, int64_t ray, double place) {
+    for (int64_t k = 0; k < AT(stock->of->filled, ray); k++)
+        if (*end_at(stock, ray, 2 * k) <= place && place < *end_at(stock, ray, 2 * k + 1))
             return true;
     return false;
 }
 
 /* Find out again which middles around the cubes of a range are solid. */
-static void renew_middles(const Dexels *stock, const Surface *surface, const Range *range) {
+static void renew_middles(const Stock *stock, const Surface *surface, const Range *range) {
     int64_t from[3], to[3], at[3];
     for (int k = 0; k < 3; k++) {
         from[k] = most(range->first[k], 1);
-        to[k] = least(range->last[k] + 1, AT(stock->cells, k));
+        to[k] = least(range->last[k] + 1, stock->cells[k]);
     }
     for (at[2] = from[2]; at[2] <= to[2]; at[2]++)
         for (at[1] = from[1]; at[1] <= to[1]; at[1]++)
@@ -73,20 +73,20 @@ static void renew_middles(const Dexels *stock, const Surface *surface, const Ran
 
 /* Return the end on the edge from a middle, which is solid or not, to the next one along an axis, which is the other; half way
    where its ray has none, as the three rays do not agree. */
-static End end_on(const Dexels *stock, int axis, const int64_t *middle, bool is_solid) {
+static End end_on(const Stock *stock, int axis, const int64_t *middle, bool is_solid) {
     End end = {.facing = 0, .stamp = 0};
-    const double size = AT(stock->cell_mm, axis);
+    const double size = stock->cell[axis];
     for (int k = 0; k < 3; k++)
         end.place[k] = middle_of(stock, k, middle[k] - 1);
     const double low = end.place[axis] - NEAR_CELLS * size, high = end.place[axis] + (1.0 + NEAR_CELLS) * size;
     end.place[axis] += 0.5 * size;
     const int64_t ray = ray_of(stock, axis, middle);
-    for (int64_t k = is_solid; k < 2 * AT(stock->filled, ray); k += 2) {
-        if (CELL(stock->ends, ray, k) < low || CELL(stock->ends, ray, k) > high)
+    for (int64_t k = is_solid; k < 2 * AT(stock->of->filled, ray); k += 2) {
+        if (*end_at(stock, ray, k) < low || *end_at(stock, ray, k) > high)
             continue;
-        end.place[axis] = CELL(stock->ends, ray, k);
-        end.facing = CELL(stock->facing, ray, k);
-        end.stamp = stamp_of(CELL(stock->facing, ray, k));
+        end.place[axis] = *end_at(stock, ray, k);
+        end.facing = *facing_at(stock, ray, k);
+        end.stamp = stamp_of(*facing_at(stock, ray, k));
         for (int m = 0; m < 3; m++)
             end.normal[m] = unpacked(end.facing, m);
         break;
@@ -143,7 +143,7 @@ static bool are_alike(int32_t a, int32_t b) {
 }
 
 /* Find out again what the surface is in a cube; return true where it has changed. */
-static bool renew_cube(const Dexels *stock, const Surface *surface, const int64_t *cube, int64_t point, int64_t stride) {
+static bool renew_cube(const Stock *stock, const Surface *surface, const int64_t *cube, int64_t point, int64_t stride) {
     End ends[MOST_ENDS];
     int count = 0, solids = 0, state = HAS_POINT;
     for (int corner = 0; corner < 8; corner++) {
@@ -173,7 +173,7 @@ static bool renew_cube(const Dexels *stock, const Surface *surface, const int64_
     double place[3];
     meet(ends, count, place);
     for (int k = 0; k < 3; k++) {
-        const double share = (place[k] - middle_of(stock, k, cube[k] - 1)) / AT(stock->cell_mm, k);
+        const double share = (place[k] - middle_of(stock, k, cube[k] - 1)) / stock->cell[k];
         *shape |= (int32_t)lrint(SHARES * clamped(share, 0.0, 1.0)) << (8 * k);
     }
     *shape |= state << 24;
@@ -188,14 +188,14 @@ static bool renew_cube(const Dexels *stock, const Surface *surface, const int64_
 }
 
 /* Turn the stamps of a slot into that of an earlier one. */
-static void age_stamps(const Dexels *stock, const Range *range) {
+static void age_stamps(const Stock *stock, const Range *range) {
     for (int axis = 0; axis < 3; axis++) {
-        const Field field = field_of(stock, axis);
-        for (int64_t v = most(range->first[field.v] - 1, 0); v < least(range->last[field.v] + 1, field.rows); v++)
-            for (int64_t u = most(range->first[field.u] - 1, 0); u < least(range->last[field.u] + 1, field.columns); u++) {
-                const int64_t ray = field.first + v * field.columns + u;
-                for (int64_t k = 0; k < 2 * AT(stock->filled, ray); k++) {
-                    int32_t *facing = &CELL(stock->facing, ray, k);
+        const Field *field = &stock->fields[axis];
+        for (int64_t v = most(range->first[field->v] - 1, 0); v < least(range->last[field->v] + 1, field->rows); v++)
+            for (int64_t u = most(range->first[field->u] - 1, 0); u < least(range->last[field->u] + 1, field->columns); u++) {
+                const int64_t ray = field->first + v * field->columns + u;
+                for (int64_t k = 0; k < 2 * AT(stock->of->filled, ray); k++) {
+                    int32_t *facing = facing_at(stock, ray, k);
                     if (stamp_of(*facing) != OF_RAW)
                         *facing = with_stamp(*facing, OF_EARLIER);
                 }
@@ -204,7 +204,7 @@ static void age_stamps(const Dexels *stock, const Range *range) {
 }
 
 /* Renew the cubes of a range, and write what has changed as events of a slot whose path begins at a point. */
-static void renew(const Dexels *stock, const Surface *surface, const Range *range, int64_t slot, int64_t point, int64_t stride,
+static void renew(const Stock *stock, const Surface *surface, const Range *range, int64_t slot, int64_t point, int64_t stride,
                   Events *events) {
     int64_t at[3];
     renew_middles(stock, surface, range);
@@ -223,7 +223,7 @@ static void renew(const Dexels *stock, const Surface *surface, const Range *rang
 }
 
 /* Return the cubes that the way between points can change; none where first is behind last. */
-static Range reached(const Dexels *stock, const Turned *points, int64_t from, int64_t to) {
+static Range reached(const Stock *stock, const Turned *points, int64_t from, int64_t to) {
     Range range;
     for (int axis = 0; axis < 3; axis++) {
         double low = INFINITY, high = -INFINITY, along[3] = {0.0, 0.0, 0.0};
@@ -235,8 +235,8 @@ static Range reached(const Dexels *stock, const Turned *points, int64_t from, in
             along[axis] = -1.0;
             low = lesser(low, -reach_of(body, &pose, along));
         }
-        const double origin = AT(stock->low_mm, axis), size = AT(stock->cell_mm, axis);
-        const double cells = (double)AT(stock->cells, axis);
+        const double origin = stock->low[axis], size = stock->cell[axis];
+        const double cells = (double)stock->cells[axis];
         range.first[axis] = (int64_t)clamped(floor((low - origin) / size - 1.0), 0.0, cells + 1.0);
         range.last[axis] = (int64_t)clamped(ceil((high - origin) / size + 1.0), -1.0, cells);
     }
@@ -251,10 +251,11 @@ static int64_t size_of(const Range *range) {
 }
 
 /* Write the surface of the raw part as events of slot -1; return how many there are. */
-EXPORT int64_t cutting_raw_surface(const Dexels *stock, const Surface *surface, Ints32 cube, Ints32 slot, Ints32 shape,
+EXPORT int64_t cutting_raw_surface(const Dexels *dexels, const Surface *surface, Ints32 cube, Ints32 slot, Ints32 shape,
                                    Ints32 point) {
+    const Stock all_of = stock_of(dexels), *stock = &all_of;
     Events events = {cube, slot, shape, point, 0};
-    const Range all = {{0, 0, 0}, {AT(stock->cells, 0), AT(stock->cells, 1), AT(stock->cells, 2)}};
+    const Range all = {{0, 0, 0}, {stock->cells[0], stock->cells[1], stock->cells[2]}};
     renew(stock, surface, &all, -1, -1, 1, &events);
     return events.count;
 }
@@ -262,8 +263,9 @@ EXPORT int64_t cutting_raw_surface(const Dexels *stock, const Surface *surface, 
 /* Cut a path out of the stock from point `from` on, where a slot of time begins; slot_of (p,) is the slot of each point.
    Returns the point to go on with, all of them where it is their number: it stops early where the events might not suffice for
    another slot, or where a ray has no room, which done[1] says; done[0] gets how many events there are. */
-EXPORT int64_t cutting_surface(const Dexels *stock, const Turned *points, Ints32 slot_of, int64_t from, const Surface *surface,
+EXPORT int64_t cutting_surface(const Dexels *dexels, const Turned *points, Ints32 slot_of, int64_t from, const Surface *surface,
                                Ints32 cube, Ints32 slot, Ints32 shape, Ints32 point, Ints done) {
+    const Stock all_of = stock_of(dexels), *stock = &all_of;
     Events events = {cube, slot, shape, point, 0};
     const int64_t count = points->position_mm.rows;
     int64_t begin = from, after = from;

@@ -33,7 +33,7 @@ typedef struct {
 _Static_assert(sizeof(Contact) == TU_CONTACT_NUMBERS * sizeof(double), "a contact has that many numbers");
 
 typedef struct {
-    const Dexels *stock;
+    const Stock *stock;
     const Turned *points;
     const Cutters *cutters;
     const double *law;
@@ -91,7 +91,7 @@ EXPORT void cutting_mark_turned(const Turned *points, Floats apart_mm, Bools nod
     }
 }
 
-bool cut_way(const Dexels *stock, const Turned *points, int64_t from, int64_t to, int32_t stamp, double *removed_mm) {
+bool cut_way(const Stock *stock, const Turned *points, int64_t from, int64_t to, int32_t stamp, double *removed_mm) {
     const Body *body = body_of(points, AT(points->tool, to));
     const double longest = AT(points->longest_mm, AT(points->tool, to));
     Step step = {.from = pose_of(points, from)};
@@ -402,6 +402,9 @@ static Contact read_contact(const Turning *turning, int64_t i, int64_t cut) {
     const double *tip = place.pose.tip, *axis = place.pose.axis, flat = sqrt(greater(1.0 - axis[2] * axis[2], 0.0));
     const int64_t bins = AT(turning->cutters->ring_bins, place.tool), used = AT(turning->cutters->used, place.tool);
     double most_mm = -INFINITY, least_mm = INFINITY;
+    const double up = 0.5 * place.body->top;
+    const double highest = highest_near(turning->stock, tip[0] + up * axis[0], tip[1] + up * axis[1],
+                                        place.body->radius + up * flat); /* beside all of the edge */
     Edge edge = {.lower = &CELL(turning->work->rows, LOWER, 0), .upper = &CELL(turning->work->rows, UPPER, 0)};
     for (int64_t j = 0; j < bins; j++)
         CELL(turning->work->reach, 0, j) = 0.0f;
@@ -416,7 +419,7 @@ static Contact read_contact(const Turning *turning, int64_t i, int64_t cut) {
         const double wide = edge.band->r_high + half;
         const double lowest = tip[2] + middle * axis[2] - half * fabs(axis[2]) - edge.band->r_high * flat;
         const double x = tip[0] + middle * axis[0], y = tip[1] + middle * axis[1];
-        if (highest_near(turning->stock, x, y, wide) <= lowest || !set_feed(turning, &place, &edge))
+        if (highest <= lowest || highest_near(turning->stock, x, y, wide) <= lowest || !set_feed(turning, &place, &edge))
             continue;
         add_edge(turning, &place, &edge, &contact, &most_mm, &least_mm);
     }
@@ -579,10 +582,11 @@ static void read_between(const Turning *turning, int64_t cut, int64_t i, const C
 /* Cut points one after the other up to the last node, and write the rows of all of them behind the last that was read; where
    the motion `ends`, that node is the last point, and all is cut. rapid_mm: how deep rapids cut on the way to points; area_mm2: the area
    of contact. Returns false where a ray has no room: it is then to be called again, with more. */
-EXPORT int64_t cutting_turned(const Dexels *stock, const Turned *points, const Cutters *cutters, Floats law,
+EXPORT int64_t cutting_turned(const Dexels *dexels, const Turned *points, const Cutters *cutters, Floats law,
                               const Work *work, double near_mm, int64_t ends, Ints progress_so_far,
                               Floats contact_so_far, Floats rapid_mm, Floats area_mm2, const Result *result) {
-    const Turning turning = {stock, points, cutters, law.at, work, near_mm};
+    const Stock stock = stock_of(dexels);
+    const Turning turning = {&stock, points, cutters, law.at, work, near_mm};
     Progress *progress = (Progress *)&AT(progress_so_far, 0);
     Contact last = *(const Contact *)&AT(contact_so_far, 0);
     int64_t tool = -1, count = points->way_mm.rows;

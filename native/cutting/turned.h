@@ -22,6 +22,6 @@ static inline Pose pose_of(const Turned *points, int64_t i) {
 
 /* Cut the way from one point to another, with a stamp (see Step); raise removed_mm as cut_out does. Returns false where a ray
    has no room. */
-bool cut_way(const Dexels *stock, const Turned *points, int64_t from, int64_t to, int32_t stamp, double *removed_mm);
+bool cut_way(const Stock *stock, const Turned *points, int64_t from, int64_t to, int32_t stamp, double *removed_mm);
 
 #endif

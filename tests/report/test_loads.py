@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from gcode2krl.report.coloured_path import coloured_path_figure
 from gcode2krl.report.columns import TimeColumns
 from gcode2krl.report.deflections import deflection_figure, share_figure
 from gcode2krl.report.forces import engaged_share, force_figure
+from gcode2krl.report.loads import draw_confidence
 from tests.report.scenes import (
     DOG_LEG,
     deflection_of,
@@ -44,6 +46,13 @@ def test_short_forces_are_lines():
     draw(figure)
     assert {"mean of a revolution", "x in $BASE", "90 %: ± 40%"} <= labels(figure)
     assert any(words.startswith("largest 50 N at 0.00 s, line 1") for words in texts(figure))
+
+
+def test_a_band_wider_than_the_force_is_drawn():
+    axes = Figure().add_subplot()
+    time_s = np.arange(4000) * 0.012
+    draw_confidence(axes, time_s, 100.0 + np.sin(9.0 * time_s), 1.2)
+    assert axes.collections[0].get_paths()[0].vertices[:, 1].min() == 0.0
 
 
 @pytest.mark.slow

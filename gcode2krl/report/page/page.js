@@ -63,7 +63,10 @@ class Page {
       this.solids = solidsOf(head.solids, this.solidColumns);
       scene.scene.add(this.solids);
     }
-    if (head.part) this.part = scene.part = new Part(this, ...this.partColumns);
+    if (head.part) {
+      this.part = scene.part = new Part(this, ...this.partColumns);
+      scene.fit("part");
+    }
     byId("show-stock").parentElement.hidden = !this.stock;
     byId("show-robot").parentElement.hidden = !this.robot;
     byId("show-cell").parentElement.hidden = !head.robot?.obstacles.length;

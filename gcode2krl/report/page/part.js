@@ -204,6 +204,12 @@ class Part {
   // mm³ of what stands.
   volume() { return this.shape.volume(); }
 
+  // What it is within, in space.
+  get box() {
+    const [low, high] = [0, 1].map((side) => new THREE.Vector3(...this.shape.ends.map((end) => end[side])));
+    return new THREE.Box3(low, high).applyMatrix4(this.mesh.matrix);
+  }
+
   detail(isFine) { this.mesh.geometry = this.shape.detail(isFine); }
 
   // ---- what is clicked

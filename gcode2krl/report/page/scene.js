@@ -198,14 +198,21 @@ class Scene {
   }
 
   fit(view) {
-    const centre = this.box.getCenter(new THREE.Vector3());
     const box = this.box.clone();
-    if (view === "robot" && this.robotBox) box.union(this.robotBox).getCenter(centre);
+    if (this.part) box.union(this.part.box);
+    if (view === "robot" && this.robotBox) box.union(this.robotBox);
+    const centre = box.getCenter(new THREE.Vector3());
     const along = { part: [0.55, -1, 0.75], top: [0, -0.001, 1], front: [0, -1, 0.12], side: [1, 0, 0.12], robot: [0.5, -1, 0.35] };
-    const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 0.5);
-    const angle = (this.camera.fov * Math.PI) / 360;
-    const far = radius / Math.sin(Math.min(angle, Math.atan(Math.tan(angle) * this.camera.aspect)));
-    this.camera.position.copy(centre).addScaledVector(new THREE.Vector3(...along[view]).normalize(), 0.92 * far);
+    const eye = new THREE.Vector3(...along[view]).normalize();
+    const right = new THREE.Vector3(0, 0, 1).cross(eye).normalize(), up = eye.clone().cross(right);
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360), wide = tall * this.camera.aspect;
+    let far = 1; // so far that each corner of the box is in view
+    for (let k = 0; k < 8; k++) {
+      const [x, y, z] = ["x", "y", "z"].map((axis, bit) => (k >> bit & 1 ? box.max : box.min)[axis] - centre[axis]);
+      const corner = new THREE.Vector3(x, y, z);
+      far = Math.max(far, corner.dot(eye) + Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(up)) / tall));
+    }
+    this.camera.position.copy(centre).addScaledVector(eye, 1.05 * far);
     this.controls.target.copy(centre);
     this.controls.update();
     this.changed(true);
