@@ -342,7 +342,7 @@ class FamilyTests:
 
     margin: float
     """Evidence of its own family over that of the best other one with the cause taken out, in nats, over the
-    inflation; the refitted form counts as a member of its family."""
+    inflation; the refitted form counts as a member of its family. One of far less power is none."""
     form_ratio: float
     """Of what its own family takes, the share that its form takes."""
     other_share: float
@@ -516,7 +516,15 @@ class LinkFamilies:
     def _tests(self, number: int, out: View, study: Study) -> FamilyTests:
         applied = self._found.applied[number]
         of_cause = [each for each in study.evidences if _is_of(applied, each)]
-        better = next((each for each in study.evidences if not _is_of(applied, each)), None)
+        # quick and small a family may have more nats than a slow cause, and is still not in its place
+        better = next(
+            (
+                each
+                for each in study.evidences
+                if not _is_of(applied, each) and self._power_share(each, number) >= _LIMITS.other_power
+            ),
+            None,
+        )
         form = out.chi2 - self._whole.chi2
         form_nats = 0.5 * form - 0.5 * self._cost(out, number)
         margin = np.inf

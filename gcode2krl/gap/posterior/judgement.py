@@ -497,7 +497,9 @@ def _judgement(
     is_sized = is_significant if named else sizes[0].significant
     rest = replace(families.beside(named), is_sized=is_sized)
     is_left = is_significant and last.share_left >= THRESHOLDS.posterior.other_share
-    is_gap = _is_gap(examination, sizes[0], rest)
+    # loud rows that the causes tell on data not used are no bursts of an instrument
+    is_foretold = bool(trials) and sizes[0].is_loud and last.share_left <= _LIMITS.named_left
+    is_gap = _is_gap(examination, sizes[0], rest) or is_foretold
     if not named and is_gap:
         is_gap = not is_wander(examination, families.traces, rest)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
