@@ -18,7 +18,7 @@ Change a number there, with its reason, run the script, and then the check in `d
 
 - **physics**: a law, an instrument, a standard, or the measured accuracy of a model.
 - **calibrated**: chosen by what it does on cases of the independent plant, whose seeds are named. Seeds
-  from 30000 on are scored; 290000-533999 were, their figures are told, and they were looked at since: no
+  from 30000 on are scored; 290000-553999 were, their figures are told, and they were looked at since: no
   figure of today is from them.
 - **convention**: an agreed limit or a setting of the computation; another of its order would serve as well.
 
