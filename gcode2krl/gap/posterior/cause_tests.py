@@ -422,7 +422,8 @@ class Rest:
     def _nats_beyond_time(self, evidence: Evidence) -> float:
         """Return its nats over the inflation, less those of time in the run, which slow noise follows.
 
-        And less those of one stretch of time: a function shows in others too, and only a step need not.
+        Or less those of one stretch of time, where that is more: a function shows in others too, and only a
+        step need not.
         """
         own_time = (
             max(other.nats, 0.0)
@@ -430,8 +431,9 @@ class Rest:
             if other.on is Dependence.RUN_TIME and other.place.component == evidence.place.component
         )
         one_share = 0.0 if evidence.on is Dependence.RUN_TIME_STEP else evidence.in_one
-        others_nats = evidence.nats - 0.5 * evidence.gain * one_share
-        return (others_nats - max(own_time, default=0.0)) / evidence.inflation
+        # each for itself: what one stretch has time follows too, and is not taken off twice
+        less = max([0.5 * evidence.gain * one_share, *own_time])
+        return (evidence.nats - less) / evidence.inflation
 
     @property
     def worth_naming(self) -> tuple[Evidence, ...]:
