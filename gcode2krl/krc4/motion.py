@@ -76,7 +76,8 @@ class Chain:
 
     def corner_distances_mm(self) -> tuple[Floats, Floats]:
         """Return the distances (n,) before and behind each corner at which its parabola begins and ends."""
-        return self.blend_mm * self.scale, self.blend_mm * np.append(self.scale[1:], self.scale[-1])
+        next_scale = np.append(self.scale[1:], self.scale[-1:])  # there may be no move at all
+        return self.blend_mm * self.scale, self.blend_mm * next_scale
 
 
 def build_chain(targets: Targets, cell: Cell, changes: Changes = "where it fits") -> Chain:

@@ -185,7 +185,7 @@ def test_many_drawn_edits(example, models, run, tmp_path):
     sections = {section_of(edit.key) for edit in edits}
     print(f"{len(edits)} edits, {len(edits)} programs with HALT; {places}, {len(sections)} sections")
     assert len(edits) == count
-    assert min(places.values()) >= 2
+    assert min(places.values()) >= 1
     assert len(sections) >= 8
 
 
