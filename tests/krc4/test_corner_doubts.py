@@ -78,3 +78,10 @@ def test_unequal_accelerations_of_a_turning_tool():
     ((other_s, assumed_s),) = figures(note, "s")
     assert other_s > assumed_s
     assert np.ptp(chain.acceleration_mm_s2 * chain.scale) > 0.0
+
+
+def test_a_program_without_a_line_leaves_nothing_open():
+    cell = load_cell()
+    targets = set_targets(read("G21 G90 G17 G54\nT1 M6\nG43 H1\nG0 X10 Y10 Z150\nM30\n", cell), cell)
+    chain = build_chain(targets, cell)
+    assert corner_issues(targets, chain, plan(chain, cell), cell) == ()
