@@ -42,8 +42,9 @@ def lag(values: Floats, time_s: Floats, tau_s: float) -> Floats:
 def delayed(values: Floats, time_s: Floats, delay_s: float) -> Floats:
     """Return y(t) = x(t - delay) of the columns of (m, c), the ends held; x is a cubic between samples.
 
-    Its slopes are those of `lag`. Straight between samples, half a step of delay would bend corners as much
-    as a lag does.
+    ``values`` (m, c) at ``time_s`` (m,) in s. Its slopes are central differences, as those of `lag`; at a
+    kink it may overshoot. Straight between samples, half a step of delay would bend corners as much as a lag
+    does.
     """
     from scipy.interpolate import CubicHermiteSpline
 

@@ -34,6 +34,7 @@ static double adjugate(Matrix a, Matrix minors) {
     return a[0][0] * minors[0][0] + a[0][1] * minors[1][0] + a[0][2] * minors[2][0];
 }
 
+/* Tell whether all solutions die out. `upper` and `lower` are two rows of Routh's array, the lower one shifted by one. */
 static bool dies_out(Matrix drag, Matrix stiffness) {
     Matrix of_drag, of_stiffness;
     const double det_drag = adjugate(drag, of_drag), det_stiffness = adjugate(stiffness, of_stiffness);

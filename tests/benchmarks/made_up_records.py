@@ -6,31 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from gcode2krl.gap.posterior.calibrated import FamilyFeatures, Features
+from gcode2krl.gap.posterior.calibrated import FamilyFeatures
+from tests.gap.test_calibrated import GOOD
 
 EFFECTS = ("backlash", "stiffness", "servo_lag", "thermal")
 OF_EACH = 6
 KINDS = {"single": 1_000, "open": 3_000, "deleted": 5_000}
 """Kind -> first seed."""
-GOOD = Features(
-    surprise=300.0,
-    size_over_noise=1.0,
-    margin=80.0,
-    form_ratio=0.98,
-    other_share=0.0,
-    other_power=0.0,
-    inconstancy=0.02,
-    constant_p=0.4,
-    shape_interval=0.1,
-    fold_agreement=1.0,
-    shrink_of_rest=0.95,
-    shrink_where_others=1.0,
-    shrink_together=0.97,
-    share_left=0.0,
-    causes=1,
-    gap_p=0.005,
-    conditions_failed=0,
-)
 _BAD = {
     "margin": -10.0,
     "form_ratio": 0.7,
