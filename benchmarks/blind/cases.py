@@ -38,7 +38,7 @@ from typing import Any, TypeVar
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
-from blind.score import flat, truth_of
+from blind.score import flat, named_of, truth_of
 
 from gcode2krl import Prediction, load_cell, load_run, predict
 from gcode2krl.effects import library
@@ -55,13 +55,25 @@ ROOT = Path(__file__).resolve().parents[2]
 SCORED_FROM = 30_000
 BLOCK = 1_000
 NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
-KINDS = ("null", "single", "slip", "open", "pair", "deleted", *NULLS[1:], "confounded", "missing", "story")
+KINDS = (
+    "null",
+    "single",
+    "slip",
+    "open",
+    "pair",
+    "deleted",
+    *NULLS[1:],
+    "confounded",
+    "missing",
+    "story",
+    "many",
+)
 """The n-th kind has the n-th block of seeds."""
 MIXED = {"null": 0.12, "single": 0.40, "slip": 0.06, "open": 0.12, "pair": 0.07, "deleted": 0.08}
 MIXED |= {"null_foreign_noise": 0.05, "null_foreign_mismatch": 0.04, "confounded": 0.03, "missing": 0.03}
 MIXED |= {"story": 0.02}
 FULL = {"null": 300, "null_foreign_noise": 100, "null_foreign_mismatch": 100, "single": 600, "pair": 220}
-FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60, "story": 60}
+FULL |= {"open": 500, "slip": 54, "confounded": 60, "missing": 60, "story": 60, "many": 60}
 ALIKE = ("servo_lag", "dead_time", "servo_gain", "backlash")
 """Effects that six synchronised servos or gears have alike: asked for at target `all` too."""
 DELETED_EACH = 10
@@ -431,6 +443,47 @@ def oracle(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> d
     return {"signal": signal, "before": before * unit, "removed": (gap - left) * unit}
 
 
+def rests(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> dict[str, list[float]]:
+    """Return for each link the RMS of its signal [before, with what is named, with the truth] in the model.
+
+    Normal mismatch is taken off each of the three, so that they can be compared; in the link's own unit.
+    """
+    found = {}
+    for link in LINK.values():
+        traces = _traces(link, runs, prediction)
+        if not traces:
+            continue
+        inputs = traces[0].inputs
+        named = [each for cause in named_of(result) for each in _of_cause(cause, inputs)]
+        true = [_applied(entry, inputs) for entry in label["effects"]]
+        sets = ([], named, [each for each in true if each is not None])
+        found[link] = [_rest(traces, acting) * traces[0].factor for acting in sets]
+    return found
+
+
+def _of_cause(cause: dict[str, Any], inputs: Any) -> Iterator[Any]:
+    """Yield the effects of a cause as the library applies them: its members where it is a group."""
+    from gcode2krl.effects import library
+    from gcode2krl.effects.registry import build
+
+    for each in cause.get("members") or [cause]:
+        values = {name: number["value"] for name, number in each["parameters"].items()}
+        if values and each["effect"] in library():
+            yield build(each["effect"], each["target"], values, library(), inputs.cell)
+
+
+def _rest(traces: Sequence[Any], acting: Sequence[Any]) -> float:
+    """Return the RMS that effects and normal mismatch leave of a link's traces."""
+    left = []
+    for trace in traces:
+        residual = trace.measured - (trace.sample(list(acting)) if acting else trace.nominal)
+        wide = _nuisance(trace)
+        flat_rest = residual.T.ravel()
+        flat_rest = flat_rest - wide @ np.linalg.lstsq(wide, flat_rest, rcond=None)[0]
+        left.append(flat_rest.reshape(trace.shape[1], -1).T)
+    return math.sqrt(_mean_square(left))
+
+
 def _traces(link: str, runs: Sequence[Any], prediction: Any) -> list[Any]:
     """Return the measured signal of a link beside its model, run by run."""
     from gcode2krl.gap.compare import links
@@ -604,6 +657,8 @@ def _beside(case: Case, folder: Path, how: How, record: dict[str, Any], predicti
     possible = case.kind in ("single", "slip") and first["effect"] not in NOT_PREDICTED
     if how.oracle and possible and first["ratio"] >= 1.0:
         record["oracle"] = oracle(label, record["result"], *loaded(folder))
+    if case.kind == "many":
+        record["rests"] = rests(label, record["result"], *loaded(folder))
     beside = how.baselines and case.seed % how.baselines == 0
     if beside and case.kind in (*NULLS, "single"):
         record["baselines"] = baselines(loaded(folder)[0], predictions)

@@ -620,6 +620,10 @@ class Judged:
     has_rest: bool = False
     """What is left is significant."""
     told: Told | None = None
+    named_share: float = 0.0
+    """Share of the truths that are among the named causes or their sets."""
+    rest: float | None = None
+    """What the named causes leave of the worst link over what the truth leaves; None where it removes nothing."""
     located: bool = False
     """Each truth has a statement of its own with its place."""
     moment: bool | None = None
@@ -762,10 +766,22 @@ def _answered(
         "tested": tested_of(result, right),
         "has_rest": bool(result["unexplained"].get("significant")),
         "next_program": (result.get("next_run") or {}).get("program"),
+        "named_share": sum(any(declares(each, one) for each in named) for one in right) / max(len(right), 1),
+        "rest": _worst_rest(record.get("rests") or {}),
         "located": located(entries, result),
         "moment": moment_hit(entries, result),
     }
     return found | (_one_effect(kind, entries[0], record) if len(entries) == 1 else {})
+
+
+def _worst_rest(rests: dict[str, list[float]]) -> float | None:
+    """Return the largest rest over that of the truth, of the links where the truth removes power that counts."""
+    ratios = [
+        named / true
+        for before, named, true in rests.values()
+        if true > 0.0 and before**2 - true**2 > LEAST_REMOVED * before**2
+    ]
+    return max(ratios, default=None)
 
 
 def _one_effect(kind: str, entry: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:

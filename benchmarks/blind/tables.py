@@ -28,6 +28,8 @@ HALF = (0.35, 0.71)
 """Ratios that count as half the noise."""
 TOLERANCE = 0.05
 CONFIDENT = 0.9
+MOST_REST = 1.2
+"""Largest rest over that of the truth that counts as all of it being in the model."""
 UNKNOWN_KINDS = ("open", "deleted")
 
 
@@ -123,6 +125,14 @@ def _others(cases: Sequence[Judged]) -> Iterator[Row]:
     yield _high("  within the declared sets", pairs, lambda e: e.declared)
     told_apart = [each for each in pairs if each.decidable]
     yield _high("  beyond mismatch, not imitated: both exactly right", told_apart, lambda e: e.exact)
+    many = [each for each in _of(cases, "many") if each.observable]
+    yield _median(
+        "three to six at once: rest over the truth's (median)", many, lambda e: [e.rest], "<= 1.2", high=False
+    )
+    left = [each for each in many if each.rest is not None]
+    yield _high("  of them at most 1.2", left, lambda e: e.rest is not None and e.rest <= MOST_REST)
+    yield _median("  share of them named or in a set (median)", many, lambda e: [e.named_share])
+    yield _low("  something else named", many, lambda e: e.is_wrongly_named)
     slips = _of(cases, "slip")
     yield _high("set-up slips: right", slips, lambda e: e.exact)
     yield _high("  within the declared sets", slips, lambda e: e.declared)

@@ -646,6 +646,11 @@ class PosteriorThresholds:
         "of the gap, what named causes may leave on data not used: of 177 right names two left more, of 51 "
         "wrong ones nine",
     )
+    follows_share: float = calibrated(
+        0.3,
+        ONCE_SCORED,
+        "of a cause's power, what an unnamed gap of a link before it does here where it is no cause of its own",
+    )
     rough_joint: float = convention(
         0.5, "of its noise's power, what one joint has more than most: heavy tails of 1,000 rows have a fifth"
     )

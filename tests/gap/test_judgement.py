@@ -1,5 +1,7 @@
 """Judgements of a link: verdict, probability and shrink on cases made for each."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -160,3 +162,15 @@ def test_more_effects_at_once_than_usual_are_not_sure_of_their_names():
     alone = [judged([2.5 * each.form(TIME_S)] * 2, waves).causes[0].probability for each in waves]
     assert max(cause.probability for cause in found.causes) < min(alone)
     assert named(judged([y] * 2, waves[:2])) == named(judged([y] * 2, waves[:2], seed=1))
+
+
+@pytest.mark.parametrize(("shape", "names"), [(STEPS, ["wave_2"]), (SINE, [])])
+def test_a_cause_that_follows_an_unnamed_gap_before_it_has_no_name(shape, names):
+    before = judged([3.0 * shape] * 3, effects=(OTHER,), seed=5)
+    elsewhere = replace(before.rest, study=replace(before.rest.study, evidences=()))
+    before = replace(before, rest=elsewhere)  # of another joint, or of none
+    assert before.verdict == "unexplained"
+    behind = replace(question((EFFECT, OTHER)), unnamed_before=(before,))
+    found = judge(LINK["gear"], [run(i, 2.0 * SINE) for i in range(3)], (), behind)
+    assert named(found) == names
+    assert [cause.applied.effect.name for cause in found.causes] == ["wave_2"]

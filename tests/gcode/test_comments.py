@@ -436,7 +436,7 @@ def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(gcode_beside_rs274, "LONGEST_S", 3.0)
     beside, difference = gcode_beside_rs274.Beside(tmp_path), gcode_beside_rs274.difference
     rng, tally = random.Random(7), {False: 0, True: 0}
-    for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::40]:
+    for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::80]:
         program = Program(path)
         theirs = beside.read("\n".join(program.lines).encode("latin-1"))
         if theirs.refused or isinstance(program.original, tuple):
@@ -444,8 +444,8 @@ def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
         assert difference(program.read(program.lines), theirs.moves) == ""
         for number, line in lines_of_code(program):
             columns = outside_comments(line)
-            changes = [(column, COMMENT) for column in rng.sample(columns, min(4, len(columns)))]
-            changes += [(rng.choice(columns), text) for text in rng.sample(OTHER_TEXTS, 2)]
+            changes = [(column, COMMENT) for column in rng.sample(columns, min(2, len(columns)))]
+            changes += [(rng.choice(columns), rng.choice(OTHER_TEXTS))]
             for column, text in changes:
                 is_read = check_beside(program, number, with_text(line, column, text), beside, difference)
                 tally[is_read] += 1

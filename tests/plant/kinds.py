@@ -30,6 +30,7 @@ KINDS = (
     "confounded",
     "missing",
     "story",
+    "many",
 )
 CLEAR = (1.0, 4.0)  # ratio of a case in which the answer must be seen
 MISSING = {  # what a person may not have
@@ -50,6 +51,10 @@ STORIES: dict[str, tuple[str, tuple[float, float] | None]] = {  # what happens, 
     "snag": ("open:cable_jerks_free", None),
 }
 """Plain events: what happens at which moment (`effects[].moments` of the label) has to be told."""
+MANY = (3, 6)  # so many of these at once, each of a place or kind of its own, as arms have them on arrival
+SMALL = (1.0, 2.5)  # ratio of each of them
+SET_UP = [*(f"mastering@A{j}" for j in range(1, 7)), "base_frame", "tool_frame", "servo_lag@all"]
+SET_UP += ["force_offset", "force_scale"]
 COMMON = {
     "servo_lag@all": (0.003, 0.03),  # s
     "dead_time@all": (0.003, 0.03),
@@ -137,6 +142,12 @@ def _double(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
     return replace(options, effect=options.effect or pair, ratios=CLEAR), {}
 
 
+def _many(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
+    count = int(rng.integers(MANY[0], MANY[1] + 1))
+    drawn = "+".join(str(each) for each in rng.choice(SET_UP, count, replace=False))
+    return replace(options, effect=options.effect or drawn, form="same", ratios=SMALL), {}
+
+
 def _deleted(rng: np.random.Generator, options: Options) -> tuple[Options, dict]:
     effect = options.effect or str(rng.choice(SHELVES["deleted"]()))
     more = {"delete": effect.partition("@")[0], "in_library": False, "answers": []}
@@ -177,6 +188,7 @@ BUILDERS = {
     "null_foreign_noise": _foreign_noise,
     "null_foreign_mismatch": _foreign_mismatch,
     "double": _double,
+    "many": _many,
     "deleted": _deleted,
     "confounded": _confounded,
     "missing": _missing,

@@ -19,7 +19,7 @@ from gcode2krl.effects.effect import LINKS, NO_TARGET
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.gap.compare.links import CLOCK, clock_columns, time_law_columns
-from gcode2krl.gap.compare.trace import Trace, unmeasured_at
+from gcode2krl.gap.compare.trace import Trace, Verdict, unmeasured_at
 from gcode2krl.gap.components import Block, Signatures, blocks_of
 
 NO_JOINTS: Mapping[str, frozenset[str]] = MappingProxyType({})
@@ -168,8 +168,8 @@ class Question:
     seed: int = 0
     joints: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Link of joints -> those that it has data of."""
-    behind_unknown: bool = False
-    """A measured link before it has a gap without a name, which may show here too."""
+    unnamed_before: tuple[Verdict, ...] = ()
+    """Measured links before it whose gaps have no name; what they have may show here too."""
 
 
 def nuisance_for(traces: Sequence[Trace], question: Question, known: Signatures) -> list[list[Nuisance]]:

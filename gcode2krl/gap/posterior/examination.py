@@ -502,7 +502,9 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
         link.clock_share(context),
         context.seed,
         context.joints,
-        any(each.verdict == "unexplained" and not each.link.tells_time for each in context.judgements),
+        tuple(
+            each for each in context.judgements if each.verdict == "unexplained" and not each.link.tells_time
+        ),
     )
 
 

@@ -490,8 +490,10 @@ def _judgement(
     is_significant = last.significant and whole.significant
     every = replace(families.rest, is_sized=is_significant)
     all_causes = list(_causes(examination, sizes, families, every, trials, rivals))
-    if examination.question.behind_unknown or _leave_much(examination, all_causes, sizes, trials):
+    if _leave_much(examination, all_causes, sizes, trials):
         all_causes = [_unnamed(cause) for cause in all_causes]
+    elif examination.question.unnamed_before:
+        all_causes = [_unnamed(each) if _may_follow(examination, each) else each for each in all_causes]
     causes = sorted(all_causes, key=lambda cause: -cause.probability)
     named = [examination.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = is_significant if named else sizes[0].significant
@@ -515,6 +517,44 @@ def _leave_much(
         return False
     size = sizes[-1] if len(named) == len(causes) else pooled([trial.size_with(named) for trial in trials])
     return size.share_left > _LIMITS.named_left and size.excess > _SURE_DEVIATIONS * size.deviation
+
+
+def _may_follow(examination: Examination, cause: Cause) -> bool:
+    """Tell whether what a cause does may be what an unnamed gap of a link before it does here.
+
+    It acts in the same joint, or it changes as that does: a share of its power is a sum of the gap's
+    components, offsets apart.
+    """
+    unnamed = [each for each in examination.question.unnamed_before if isinstance(each, Judgement)]
+    if len(unnamed) < len(examination.question.unnamed_before):
+        return True
+    families = [each for judged in unnamed if judged.rest for each in judged.rest.worth_naming]
+    if any(each.place.name == cause.applied.target for each in families):
+        return True
+    others = examination.without(examination.applied.index(cause.applied))
+    inputs, moved = [], []
+    for trace in examination.traces:
+        before = [
+            np.stack([np.interp(trace.time_s, each.time_s, column) for column in rest.T], axis=1)
+            for judged in unnamed
+            for each in judged.every
+            if each.run_number == trace.run_number
+            for rest in (each.measured - judged.fitted(each, each.time_s),)
+        ]
+        if before:
+            columns = np.concatenate(before, axis=1)
+            inputs.append(columns - columns.mean(axis=0))
+            moved.append(trace.sample(examination.applied) - trace.sample(others))
+    widths = {each.shape[1] for each in inputs}
+    if len(widths) != 1:
+        return True
+    return share_told(np.concatenate(inputs), np.concatenate(moved)) > _LIMITS.follows_share
+
+
+def share_told(columns: Floats, signal: Floats) -> float:
+    """Return the share of a signal's power (n, k) that sums of some columns (n, c) take."""
+    told = columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
+    return float(np.sum(told**2) / max(np.sum(signal**2), 1e-300))
 
 
 def _unnamed(cause: Cause) -> Cause:
