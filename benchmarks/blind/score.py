@@ -623,7 +623,7 @@ class Judged:
     named_share: float = 0.0
     """Share of the truths that are among the named causes or their sets."""
     rest: float | None = None
-    """What the named causes leave of the worst link over what the truth leaves; None where it removes nothing."""
+    """What the named causes leave over what the truth leaves, of the worst link; None where that takes nothing."""
     located: bool = False
     """Each truth has a statement of its own with its place."""
     moment: bool | None = None
@@ -775,7 +775,7 @@ def _answered(
 
 
 def _worst_rest(rests: dict[str, list[float]]) -> float | None:
-    """Return the largest rest over that of the truth, of the links where the truth removes power that counts."""
+    """Return the largest rest over the truth's, of the links where the truth removes power that counts."""
     ratios = [
         named / true
         for before, named, true in rests.values()

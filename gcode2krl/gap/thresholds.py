@@ -649,7 +649,7 @@ class PosteriorThresholds:
     follows_share: float = calibrated(
         0.3,
         ONCE_SCORED,
-        "of a cause's power, what an unnamed gap of a link before it does here where it is no cause of its own",
+        "of a cause's power, what follows an unnamed gap of a link before it where the cause is none of its own",
     )
     rough_joint: float = convention(
         0.5, "of its noise's power, what one joint has more than most: heavy tails of 1,000 rows have a fifth"
