@@ -446,7 +446,8 @@ def oracle(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> d
 def rests(label: dict, result: dict, runs: Sequence[Any], prediction: Any) -> dict[str, list[float]]:
     """Return for each link the RMS of its signal [before, with what is named, with the truth] in the model.
 
-    Normal mismatch is taken off each of the three, so that they can be compared; in the link's own unit.
+    The clock of each run is taken off all three, no other mismatch: it is left beside the truth too. In the
+    link's own unit.
     """
     found = {}
     for link in LINK.values():
@@ -473,14 +474,11 @@ def _of_cause(cause: dict[str, Any], inputs: Any) -> Iterator[Any]:
 
 
 def _rest(traces: Sequence[Any], acting: Sequence[Any]) -> float:
-    """Return the RMS that effects and normal mismatch leave of a link's traces."""
+    """Return the RMS that effects and the clock leave of a link's traces."""
     left = []
     for trace in traces:
-        residual = trace.measured - (trace.sample(list(acting)) if acting else trace.nominal)
-        wide = _nuisance(trace)
-        flat_rest = residual.T.ravel()
-        flat_rest = flat_rest - wide @ np.linalg.lstsq(wide, flat_rest, rcond=None)[0]
-        left.append(flat_rest.reshape(trace.shape[1], -1).T)
+        residual, late = trace.measured - trace.sample(list(acting)), replace(trace, minus=None).rate
+        left.append(residual - late * (np.sum(late * residual) / max(np.sum(late**2), 1e-300)))
     return math.sqrt(_mean_square(left))
 
 

@@ -623,7 +623,7 @@ class Judged:
     named_share: float = 0.0
     """Share of the truths that are among the named causes or their sets."""
     rest: float | None = None
-    """What the named causes leave over what the truth leaves, of the worst link; None where that takes nothing."""
+    """What named causes leave over what the truth leaves, of the worst link; None where it takes nothing."""
     located: bool = False
     """Each truth has a statement of its own with its place."""
     moment: bool | None = None

@@ -523,6 +523,12 @@ class PosteriorThresholds:
         "of what its own family takes, which the form of a named cause takes at least: right names took 0.95 "
         "and more, another form of wear among them",
     )
+    small_errors: float = calibrated(
+        0.01,
+        DEVELOPMENT,
+        "of the power that a base frame takes, what small errors of tool and mastering beside it may: three "
+        "to six at once left up to 0.006, unknowns of the same kind 0.02 and more",
+    )
     other_share: float = calibrated(
         0.05,
         DEVELOPMENT,
@@ -649,7 +655,7 @@ class PosteriorThresholds:
     follows_share: float = calibrated(
         0.3,
         ONCE_SCORED,
-        "of a cause's power, what follows an unnamed gap of a link before it where the cause is none of its own",
+        "of a cause's power, what follows an unnamed gap of a link before it where it is none of its own",
     )
     rough_joint: float = convention(
         0.5, "of its noise's power, what one joint has more than most: heavy tails of 1,000 rows have a fifth"

@@ -14,6 +14,7 @@ family takes a share of the gap worth naming. All of it is on every run, those t
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -332,6 +333,8 @@ def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
 
 
 _PRIOR = THRESHOLDS.posterior.prior_sizes
+_SMALL_ERRORS = frozenset({"base_frame", "tool_frame", "mastering"})
+"""What is off by a little on every arm as it is set up; of these many may be, and none shows for itself."""
 _MOVED = 1e-3
 """Of the power in the component that a cause moves most: one with less is not moved."""
 
@@ -543,6 +546,13 @@ class LinkFamilies:
         if other is not None and net_gain(other) <= own_rest:
             other = None  # its own family takes more of the same: it is of another form, not beside another
         gap_gain = 0.0 if other is None else self._gap_gain(near, other.place.component)
+        least_form = _LIMITS.form_ratio
+        if applied.effect.family == "geometry":
+            least_form = 1.0 - _LIMITS.model_error**2
+            is_nearly = form >= (1.0 - _LIMITS.small_errors) * (form + own_rest)
+            if applied.effect.name == "base_frame" and is_nearly:  # seldom the only small error of a set-up
+                left = self._beside_small_errors.evidences
+                own_rest = max((net_gain(each) for each in left if _is_of(applied, each)), default=0.0)
         return FamilyTests(
             margin=float(margin),
             form_ratio=form / max(form + own_rest, 1e-30),
@@ -550,11 +560,30 @@ class LinkFamilies:
             other_power=0.0 if other is None else self._power_share(other, number),
             family=of_cause[0] if of_cause else None,
             family_behind=(form_nats - of_cause[0].nats) / of_cause[0].inflation if of_cause else None,
-            least_form=1.0 - _LIMITS.model_error**2
-            if applied.effect.family == "geometry"
-            else _LIMITS.form_ratio,
+            least_form=least_form,
             better=better,
         )
+
+    @cached_property
+    def _beside_small_errors(self) -> Study:
+        """What families say beside the accepted effects and small errors of frames and mastering."""
+        applied, traces = self._found.applied, self._rows.traces
+        taken = {each.key for each in applied}
+        small = [
+            setting
+            for block in self._found.question.blocks
+            if block.effect.name in _SMALL_ERRORS and block.key not in taken
+            for setting in block.settings(traces[0])
+        ]
+        columns = []
+        for trace in traces:
+            model = trace.sample(applied)
+            moved = [(trace.sample((*applied, each)) - model).T for each in small]
+            columns.append(np.stack(moved, axis=2) if moved else np.zeros((*model.T.shape, 0)))
+        tangents = np.concatenate([self._whole.tangents, self._rows.of(columns)], axis=1)
+        view = self._whole.beside(self._whole.residual, tangents)
+        (study,) = studies(self._rows, [view], self._grid, self._found.question.seed)
+        return study
 
     def _components(self, number: int) -> frozenset[int]:
         """Return the components of the signal that an accepted effect moves."""
