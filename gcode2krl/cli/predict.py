@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gcode2krl.cli.allowed import as_allowed, with_allowed
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
+    allow_option,
     cell_files,
     common_options,
     effect_files,
@@ -51,6 +53,7 @@ _CORNERS = "corners.csv"
 @gcode_options
 @simplify_option
 @job_option
+@allow_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
 )
@@ -84,6 +87,7 @@ def command(
     simplify_mm: float | None,
     job_path: str | None,
     tools_path: str | None,
+    allow: tuple[str, ...],
     dt_s: float | None,
     csv: bool,
     plot: bool,
@@ -96,7 +100,8 @@ def command(
 ) -> int:
     """Predict what the robot will do: path, timing, joints, cutting forces, deflection.
 
-    Findings that would refuse a program are only reported here.
+    Findings that would refuse a program are only reported here; those of --allow as the warnings that they
+    are to a program.
     """
     from gcode2krl.cli.loads import load_lines
     from gcode2krl.prediction.forecast import load_figures
@@ -143,6 +148,8 @@ def command(
             comparison = compared(prediction, nominal) if nominal is not None else None
             if comparison is not None and nominal is not None:
                 prediction = with_comparison(prediction, comparison, nominal)
+            by_name = () if "allow" in project.options else allow
+            prediction = with_allowed(prediction, by_name, project.options.get("allow", ()))
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
             files.append(_save_corners(corners, folder, inputs))
@@ -174,10 +181,10 @@ def command(
                 **({"nominal": as_dict(comparison)} if comparison is not None else {}),
                 **project.record,
             },
-            prediction.issues,
+            as_allowed(prediction),
             files=files,
         )
-    console.findings(prediction.issues, part)
+    console.findings(as_allowed(prediction), part)
     console.say(f"{part} -> {folder}: {', '.join(file.name for file in files)}")
     console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")
     cycle_s = prediction.cell.controller.cycle_s
