@@ -69,6 +69,13 @@ class Dexels(NamedTuple):
         _refuse_more_than(MOST - 1, self.filled)
         return self._replace(ends=_twice(self.ends), facing=_twice(self.facing))
 
+    def stretches(self) -> tuple[Ints, Floats]:
+        """Return the ray (s,) of each stretch of material, rising, and both its ends (s, 2) in mm."""
+        ray = np.repeat(np.arange(len(self.filled)), self.filled)
+        after = np.cumsum(self.filled)
+        begin = self.first[ray] + 2 * (np.arange(len(ray)) - (after - self.filled)[ray])
+        return ray, self.ends[begin[:, None] + [0, 1]].astype(np.float64)
+
     def depths(self, places_mm: Floats) -> Floats:
         """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""
         depth = np.empty(len(places_mm))
@@ -113,15 +120,8 @@ def dexel_block(box_mm: Floats, cell_mm: float) -> Dexels:
 def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     """Return a closed mesh as dexels: each ray begins and ends where it passes a triangle."""
     low_mm, size_mm, cells = _grid(np.array(mesh.bounds, dtype=np.float64), cell_mm)
-    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
-    firsts, crossings = _firsts(cells), []
-    for axis in range(3):
-        ray, at, normal = _crossed(triangles, axis, low_mm, size_mm, cells)
-        crossings.append((ray + firsts[axis], at, normal))
-    ray, at, normal = (np.concatenate(column) for column in zip(*crossings, strict=True))
-    order = np.lexsort((at, ray))
-    ray, at, normal = ray[order], at[order], normal[order]
-    count = np.bincount(ray, minlength=firsts[3])
+    ray, at, normal = crossings(mesh, low_mm, size_mm, cells)
+    count = np.bincount(ray, minlength=_firsts(cells)[3])
     _refuse_more_than(MOST, count // 2)
     dexels = _with_ends(low_mm, size_mm, cells, -(-count // 2))
     dexels.filled[:] = count // 2
@@ -129,6 +129,20 @@ def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     dexels.ends[place], dexels.facing[place] = at, _packed(normal)
     _bound(dexels)
     return dexels
+
+
+def crossings(
+    mesh: "trimesh.Trimesh", low_mm: Floats, cell_mm: Floats, cells: Ints
+) -> tuple[Ints, Floats, Floats]:
+    """Return where the rays of dexels pass a mesh: rays (c,), rising, places, rising on each, normals (c, 3)."""
+    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
+    firsts, of_fields = _firsts(cells), []
+    for axis in range(3):
+        ray, at, normal = _crossed(triangles, axis, low_mm, cell_mm, cells)
+        of_fields.append((ray + firsts[axis], at, normal))
+    ray, at, normal = (np.concatenate(column) for column in zip(*of_fields, strict=True))
+    order = np.lexsort((at, ray))
+    return ray[order], at[order], normal[order]
 
 
 def _crossed(

@@ -64,7 +64,7 @@ def surface_history(
     """
     tools = [cell.tool[number] for number in outlook.numbers]
     raw, _ = dexels_of(toolpath, cell, tools, most_squares=most[0])
-    points, sample = _points(motion, outlook, np.array([body_of(tool) for tool in tools]))
+    points, sample = path_points(motion, outlook, np.array([body_of(tool) for tool in tools]))
     time_s = motion.time_s[sample] - motion.time_s[0]
     slot = (time_s / max(slots[0], slots[1] * float(time_s[-1]))).astype(np.int32)
     events, surface = _cut_out(raw, points, slot)
@@ -93,7 +93,7 @@ def surface_history(
     )
 
 
-def _points(motion: Motion, outlook: Outlook, bodies: Floats) -> tuple[Turned, Ints]:
+def path_points(motion: Motion, outlook: Outlook, bodies: Floats) -> tuple[Turned, Ints]:
     """Return the way of the tool, and the sample (k,) to which the sweep to each point belongs."""
     tool = np.searchsorted(outlook.numbers, motion.tool).astype(np.int32)
     joined = np.append(False, tool[1:] == tool[:-1])
