@@ -136,4 +136,4 @@ def on_page(comparison: "Comparison") -> dict[str, Any]:
     plain = as_dict(comparison)
     for difference, shown in zip(comparison.differences, plain["differences"], strict=True):
         shown |= {"row": difference.row, "triangles_mm": np.asarray(difference.solid.triangles)}
-    return plain | {"above_mm": comparison.above_mm}
+    return plain | {"above_mm": comparison.above_mm, "at_mm": comparison.at_mm}

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
+_NOMINAL = "part_nominal"
 
 
 @click.command(
@@ -158,7 +159,7 @@ def command(
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
                 begin("figures")
-                files += _draw(prediction, folder, inputs)
+                files += _draw(prediction, comparison, folder, inputs)
     except Gcode2KrlError as error:
         return console.refused(error, ["moves", "time_s", "path_mm"], part)
     motion = prediction.motion
@@ -207,7 +208,7 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
-    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in FIGURES)]
+    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in (*FIGURES, _NOMINAL))]
     require_folder(folder, names, inputs)
     if part_mesh is None:
         return
@@ -257,12 +258,17 @@ def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> 
     return file
 
 
-def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Path]:
-    """Draw every stage that ran; returns the files."""
-    from gcode2krl.figures import figures_of
+def _draw(
+    prediction: "Prediction", comparison: "Comparison | None", folder: Path, inputs: list[Path]
+) -> list[Path]:
+    """Draw every stage that ran, and the part against the nominal one; returns the files."""
+    from gcode2krl.figures import against_nominal, figures_of
     from gcode2krl.report.figures import save_figures
 
-    return save_figures(figures_of(prediction), folder, inputs)
+    figures = figures_of(prediction)
+    if comparison is not None:
+        figures[_NOMINAL] = against_nominal(prediction, comparison.above_mm, comparison.at_mm)
+    return save_figures(figures, folder, inputs)
 
 
 def _folder(part: str, output: str | None) -> Path:

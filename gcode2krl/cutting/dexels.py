@@ -134,7 +134,7 @@ def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
 def crossings(
     mesh: "trimesh.Trimesh", low_mm: Floats, cell_mm: Floats, cells: Ints
 ) -> tuple[Ints, Floats, Floats]:
-    """Return where the rays of dexels pass a mesh: rays (c,), rising, places, rising on each, normals (c, 3)."""
+    """Return where rays of dexels pass a mesh: rays (c,) and places, both rising, and normals (c, 3)."""
     triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
     firsts, of_fields = _firsts(cells), []
     for axis in range(3):

@@ -174,7 +174,7 @@ def _difference(
 def shell(
     origin_mm: Floats, cell_mm: Floats, above_mm: Floats, under_mm: Floats, to_field: Floats
 ) -> "manifold3d.Manifold":
-    """Return what lies between heights (r, c), which are -inf where nothing does, turned back into ``$BASE``."""
+    """Return what lies between heights (r, c), -inf where nothing does, turned back into ``$BASE``."""
     bottom_mm = float(under_mm[np.isfinite(under_mm)].min()) - _BELOW_MM
     above, under = (np.pad(heights, 1, constant_values=-np.inf) for heights in (above_mm, under_mm))
     around = np.where(np.isinf(under), _highest(under), under)

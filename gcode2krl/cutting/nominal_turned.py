@@ -1,11 +1,12 @@
 """The finished part against the nominal one where the tool axis turned: stretch by stretch of the rays.
 
-A stretch of a ray that only one of both has is gouge or rest. It is as deep as the farthest of its ends and its
-middle is from the surface of the nominal part, in space: there is no height to compare. Ends of stretches are
-places on the finished surface, exact to 2 % of a cell, so that walls and undercuts are judged like floors.
+A stretch of a ray that only one of both has is gouge or rest. Its depth is the largest distance, in space, of
+its ends and its middle from the nominal surface. Ends of stretches are places on the finished surface, exact to
+2 % of a cell, so that walls and undercuts are judged like floors.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -59,7 +60,7 @@ class _Stretches(NamedTuple):
     is_cut: Bools
     """(n, 2) which ends are on the finished surface."""
     depth_mm: Floats
-    """(n, 3) distance of the ends on the finished surface and of the middle from the nominal surface, else 0."""
+    """(n, 3) distance from the nominal surface of the ends that are cut and of the middle, else 0."""
     toward: Floats
     """(n, 3) unit vector from the nominal surface to the deepest of them."""
 
@@ -96,18 +97,12 @@ def compare_turned(
     stretch, end = np.nonzero(found.is_cut & (found.depth_mm[:, :2] > TOLERANCE_MM))
     sign = np.where(found.is_gouge[stretch], -1.0, 1.0)
     return Comparison(
-        tuple(_with_row(one, row) for one, row in zip(differences, rows, strict=True)),
+        tuple(replace(one, row=row) for one, row in zip(differences, rows, strict=True)),
         left_out,
         volume_mm3,
         sign * found.depth_mm[stretch, end],
         found.place_mm[stretch, end],
     )
-
-
-def _with_row(difference: Difference, row: int) -> Difference:
-    from dataclasses import replace
-
-    return replace(difference, row=row)
 
 
 def _stretches(dexels: Dexels, wanted: "trimesh.Trimesh") -> _Stretches:
@@ -118,13 +113,18 @@ def _stretches(dexels: Dexels, wanted: "trimesh.Trimesh") -> _Stretches:
     ray = np.concatenate([np.repeat(ray_have, 2), ray_want])
     at = np.concatenate([ends_mm.ravel(), at_want])
     none_have, none_want = np.zeros(len(ray_want), np.int64), np.zeros(2 * len(ray_have), np.int64)
-    steps = np.concatenate([np.tile([1, -1], len(ray_have)), none_have]), np.concatenate([none_want, step_want])
+    steps = (
+        np.concatenate([np.tile([1, -1], len(ray_have)), none_have]),
+        np.concatenate([none_want, step_want]),
+    )
     order = np.lexsort((at, ray))
     ray, at = ray[order], at[order]
     has, wants = (np.cumsum(step[order]) > 0 for step in steps)
     is_cut = steps[0][order] != 0
     k = np.flatnonzero((ray[1:] == ray[:-1]) & (has != wants)[:-1] & (np.diff(at) > TOLERANCE_MM))
-    first = np.cumsum([0, *(dexels.cells[(axis + 1) % 3] * dexels.cells[(axis + 2) % 3] for axis in range(3))])
+    first = np.cumsum(
+        [0, *(dexels.cells[(axis + 1) % 3] * dexels.cells[(axis + 2) % 3] for axis in range(3))]
+    )
     axis = np.searchsorted(first, ray[k], side="right") - 1
     row, column = np.divmod(ray[k] - first[axis], dexels.cells[(axis + 1) % 3])
     span_mm = np.stack([at[k], at[k + 1]], axis=1)
@@ -187,7 +187,7 @@ def _groups(found: _Stretches, dexels: Dexels) -> list[_Stretches]:
 
 
 def _volume_mm3(group: _Stretches, cell_mm: Floats) -> float:
-    """Return the volume of a place: what the rays along each axis say, weighted by how far it faces that axis.
+    """Return the volume of a place: by the rays along each axis, weighted by how far it faces that axis.
 
     Rays along a thin layer meet it by chance; those across it say how thick it is.
     """
@@ -215,10 +215,14 @@ def _shells(group: _Stretches, dexels: Dexels) -> "list[manifold3d.Manifold]":
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         for sign in (-1.0, 1.0):
-            rows = np.flatnonzero((group.axis == axis) & (is_across | ~is_across.any()) & (sign * along >= 0.0))
+            rows = np.flatnonzero(
+                (group.axis == axis) & (is_across | ~is_across.any()) & (sign * along >= 0.0)
+            )
             if not len(rows):
                 continue
-            rows = rows[np.argsort(np.diff(group.span_mm[rows], axis=1)[:, 0], kind="stable")]  # the longest stays
+            rows = rows[
+                np.argsort(np.diff(group.span_mm[rows], axis=1)[:, 0], kind="stable")
+            ]  # the longest stays
             column, row = (each[rows] - each[rows].min() for each in (group.column, group.row))
             above = np.full((int(row.max()) + 1, int(column.max()) + 1), -np.inf)
             under = above.copy()

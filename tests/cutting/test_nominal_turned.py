@@ -27,8 +27,12 @@ ASIDE = np.array([0.0, np.cos(np.radians(TILT_DEG)), -np.sin(np.radians(TILT_DEG
 TILTED, ASTRAY = np.array([0.0, 12.0, -12.0]), np.array([0.0, 12.0, -12.0]) + GOUGE_MM * ASIDE
 
 
-def words(place):
-    return "X{:.4f} Y{:.4f} Z{:.4f}".format(*place)
+def at(x_mm, place):
+    return np.array([x_mm, *place[1:]])
+
+
+def words(x_mm, place):
+    return "X{:.4f} Y{:.4f} Z{:.4f}".format(*at(x_mm, place))
 
 
 def program(angle_deg):
@@ -40,13 +44,13 @@ def program(angle_deg):
             "T1 M6",
             f"G0 G43 H1 X-20 Y12 Z60 A{angle_deg} C0",
             "S8000 M3",
-            f"G0 {words(TILTED + [-20.0, 0.0, 0.0])}",
-            f"G1 {words(TILTED + [80.0, 0.0, 0.0])} F1200",
-            f"G1 {words(TILTED + [40.0, 0.0, 0.0])}",
-            f"G1 {words(ASTRAY + [40.0, 0.0, 0.0])} F300",
-            f"G1 {words(ASTRAY + [20.0, 0.0, 0.0])}",
-            f"G1 {words(TILTED + [20.0, 0.0, 0.0])}",
-            f"G0 {words(away + [20.0, 0.0, 0.0])}",
+            f"G0 {words(-20.0, TILTED)}",
+            f"G1 {words(80.0, TILTED)} F1200",
+            f"G1 {words(40.0, TILTED)}",
+            f"G1 {words(40.0, ASTRAY)} F300",
+            f"G1 {words(20.0, ASTRAY)}",
+            f"G1 {words(20.0, TILTED)}",
+            f"G0 {words(20.0, away)}",
             "G0 Z80 A0",
             "G0 X-20 Y32",
             "G0 Z-4",
@@ -75,12 +79,12 @@ def block(low=BOX[0], high=BOX[1]):
 def wanted():
     """The part without the move that goes astray."""
     upright = swept([-20.0, 32.0, -4.0], [80.0, 32.0, -4.0], [0.0, 0.0, 1.0])
-    return block() - swept(TILTED + [-20.0, 0.0, 0.0], TILTED + [80.0, 0.0, 0.0], AXIS) - upright
+    return block() - swept(at(-20.0, TILTED), at(80.0, TILTED), AXIS) - upright
 
 
 def astray():
     """What that move takes."""
-    along = swept(ASTRAY + [20.0, 0.0, 0.0], ASTRAY + [40.0, 0.0, 0.0], AXIS)
+    along = swept(at(20.0, ASTRAY), at(40.0, ASTRAY), AXIS)
     return wanted() ^ along
 
 
