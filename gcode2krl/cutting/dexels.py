@@ -60,6 +60,18 @@ class Dexels(NamedTuple):
         """Volume of the material."""
         return float(_volume(self))
 
+    @property
+    def size_mm(self) -> Floats:
+        """Size (3,) of the box around the raw part."""
+        size: Floats = self.cells * self.cell_mm
+        return size
+
+    @property
+    def top_mm(self) -> float:
+        """The highest place of the material, -inf where there is none."""
+        blocks = -(-int(self.cells[0]) // SIDE) * -(-int(self.cells[1]) // SIDE)
+        return float(self.bound[-blocks:, 1].max())
+
     def copy(self) -> "Dexels":
         """Return dexels that can be cut without changing these."""
         return self._replace(**{name: getattr(self, name).copy() for name in _CUT})
@@ -75,6 +87,27 @@ class Dexels(NamedTuple):
         after = np.cumsum(self.filled)
         begin = self.first[ray] + 2 * (np.arange(len(ray)) - (after - self.filled)[ray])
         return ray, self.ends[begin[:, None] + [0, 1]].astype(np.float64)
+
+    def coarser(self, cell_mm: float) -> "Dexels":
+        """Return the same material on fewer rays, each as the nearest of these."""
+        low_mm, size_mm, cells = _grid(
+            np.array([self.low_mm, self.low_mm + self.cells * self.cell_mm]), cell_mm
+        )
+        firsts, rays = _firsts(self.cells), []
+        for axis in range(3):
+            column, row = (
+                ((np.arange(cells[k]) + 0.5) * size_mm[k] / self.cell_mm[k]).astype(np.int64)
+                for k in ((axis + 1) % 3, (axis + 2) % 3)
+            )
+            rays.append((firsts[axis] + row[:, None] * self.cells[(axis + 1) % 3] + column).ravel())
+        ray = np.concatenate(rays)
+        made = _with_ends(low_mm, size_mm, cells, self.filled[ray].astype(np.int64))
+        ends = 2 * made.filled.astype(np.int64)
+        number = np.arange(ends.sum()) - np.repeat(np.cumsum(ends) - ends, ends)
+        to, of = (np.repeat(first.astype(np.int64), ends) + number for first in (made.first, self.first[ray]))
+        made.ends[to], made.facing[to] = self.ends[of], self.facing[of] & 0xFFFFFF  # without a stamp
+        _bound(made)
+        return made
 
     def depths(self, places_mm: Floats) -> Floats:
         """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""

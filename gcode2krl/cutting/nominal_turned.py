@@ -1,7 +1,7 @@
 """The finished part against the nominal one where the tool axis turned: stretch by stretch of the rays.
 
-A stretch of a ray that only one of both has is gouge or rest. Its depth is the largest distance, in space, of
-its ends and its middle from the nominal surface. Ends of stretches are places on the finished surface, exact to
+A stretch of a ray that only one of both has is gouge or rest. Its depth is the largest distance, in space,
+of its ends and its middle from the nominal surface. Ends of stretches are on the finished surface, exact to
 2 % of a cell, so that walls and undercuts are judged like floors.
 """
 

@@ -1,12 +1,13 @@
 """What has to be known of a whole motion before the first of it is cut."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
+from gcode2krl.cutting.dexels import Dexels
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.tables import Motion
 
@@ -30,10 +31,9 @@ class Outlook:
     turns: bool = False
     """True where the tool axis changes: one height field cannot hold what is cut."""
 
-    def require_one_axis(self, what: str) -> None:
-        """Raise `RefusedError` where the tool axis changes; ``what`` is not done then."""
-        if self.turns:
-            raise axis_changes(what)
+    def on(self, left: object) -> "Outlook":
+        """Return what is needed to go on with what lines before have left: where those are dexels, dexels."""
+        return replace(self, to_field=np.eye(3), turns=True) if isinstance(left, Dexels) else self
 
 
 def axis_changes(what: str) -> RefusedError:

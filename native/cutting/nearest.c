@@ -1,4 +1,4 @@
-/* Which pose of a path comes nearest to a place. */
+/* Where a path comes nearest to a place, and where it meets material first. */
 
 #include "cutting/turned.h"
 
@@ -15,4 +15,16 @@ EXPORT void cutting_nearest_poses(const Turned *points, Floats places_mm, Ints n
             }
         }
     }
+}
+
+/* Cut along a path until it meets material; raise `removed_mm` (3) to the longest stretch taken from a ray of each field. Returns
+   the point by which that was, the number of points where it meets none. */
+EXPORT int64_t cutting_first_contact(const Dexels *dexels, const Turned *points, Floats removed_mm) {
+    const Stock stock = stock_of(dexels);
+    double *removed = &AT(removed_mm, 0);
+    for (int64_t k = 1; k < points->position_mm.rows; k++) {
+        if (!cut_way(&stock, points, k - 1, k, 0, removed) || lesser(removed[0], lesser(removed[1], removed[2])) > 0.0)
+            return k;
+    }
+    return points->position_mm.rows;
 }
