@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from gcode2krl import Gcode2KrlError, load_cell, predict, read_gcode, set_targets, write_krl
 from gcode2krl.cell.sections import Machine
 from gcode2krl.cutting import history_of, remove
-from gcode2krl.errors import RefusedError
+from gcode2krl.cutting.surface import dexels_to_mesh
 from gcode2krl.pipeline import predict_toolpath
 from gcode2krl.restart.material import restarted
 
@@ -142,11 +142,14 @@ def test_predict_has_forces_and_says_what_is_less_sure():
     assert np.isfinite(prediction.deflection.deflection_base_mm[on_cone]).all()
 
 
-def test_what_needs_one_height_is_refused(tmp_path):
+def test_the_part_is_written_as_a_closed_mesh():
     cell = load_cell(CELL)
     prediction = predict(PART, cell)
-    with pytest.raises(RefusedError, match="the tool axis changes"):
-        _ = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).part
+    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).left
+    mesh = dexels_to_mesh(left)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(left.volume_mm3, rel=0.003)
+    np.testing.assert_allclose(mesh.bounds[0], left.low_mm, atol=0.1)
 
 
 @pytest.mark.parametrize("from_line", [18, 30])

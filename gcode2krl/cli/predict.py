@@ -222,12 +222,15 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path:
     """Write the machined stock as a mesh."""
     from gcode2krl.cutting import remove
+    from gcode2krl.cutting.height_field import HeightField
     from gcode2krl.cutting.raw_part import to_mesh
+    from gcode2krl.cutting.surface import dexels_to_mesh
     from gcode2krl.files import write_together
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
-    mesh = to_mesh(remove(prediction.toolpath, prediction.motion, prediction.cell).part)
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell).left
+    mesh = to_mesh(left) if isinstance(left, HeightField) else dexels_to_mesh(left)
     content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
     write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)
     return file

@@ -17,7 +17,7 @@ from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
-from gcode2krl.cutting.outlook import Outlook, axis_changes, outlook_of, turned
+from gcode2krl.cutting.outlook import Outlook, outlook_of, turned
 from gcode2krl.cutting.raw_part import dexels_of, height_field_of
 from gcode2krl.cutting.reading import Result
 from gcode2krl.cutting.records import copied, followed, taken
@@ -153,13 +153,6 @@ class Removal:
     """The material that is left; dexels where the tool axis turns."""
     to_field: Floats
     """(3, 3) rotation from ``$BASE`` to its frame."""
-
-    @property
-    def part(self) -> HeightField:
-        """What is left as a height field; raises `RefusedError` where the tool axis turns."""
-        if isinstance(self.left, HeightField):
-            return self.left
-        raise axis_changes("the finished part has no single height above a place")
 
 
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:

@@ -77,7 +77,9 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     turn = np.eye(4)
     turn[:3, :3] = removal.to_field
     wanted = mesh_of(solid_of(nominal)).apply_transform(turn)
-    have, want = _heights(removal.part, wanted)
+    part = removal.left
+    assert isinstance(part, HeightField), "of dexels see nominal_turned"
+    have, want = _heights(part, wanted)
     differences: list[Difference] = []
     left_out: dict[Kind, int] = {}
     volume_mm3: dict[Kind, float] = {}
@@ -87,11 +89,11 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     )
     for kind, depth_mm in kinds:
         judged = want + (depth_mm if kind == "rest" else -depth_mm)
-        places, volumes = _places(depth_mm > 0.0, depth_mm * removal.part.cell_mm.prod())
+        places, volumes = _places(depth_mm > 0.0, depth_mm * part.cell_mm.prod())
         volume_mm3[kind], left_out[kind] = float(sum(volumes)), max(len(places) - MOST_SOLIDS, 0)
         for number in np.argsort(-np.array(volumes), kind="stable")[:MOST_SOLIDS]:
             rows, columns, mask = places[number]
-            cut = _part_of(removal.part, rows, columns)
+            cut = _part_of(part, rows, columns)
             pair = judged[rows, columns], want[rows, columns]
             differences.append(_difference(kind, volumes[number], cut, mask, *pair, removal, motion))
     above_mm = kinds[1][1] - kinds[0][1]

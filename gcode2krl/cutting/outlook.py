@@ -8,7 +8,6 @@ import numpy as np
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
 from gcode2krl.cutting.dexels import Dexels
-from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.tables import Motion
 
 _SAME_AXIS = 1e-9
@@ -34,12 +33,6 @@ class Outlook:
     def on(self, left: object) -> "Outlook":
         """Return what is needed to go on with what lines before have left: where those are dexels, dexels."""
         return replace(self, to_field=np.eye(3), turns=True) if isinstance(left, Dexels) else self
-
-
-def axis_changes(what: str) -> RefusedError:
-    """Return the refusal of ``what`` needs one tool axis."""
-    sentence, remedy = f"the tool axis changes: {what}", "split the program by set-up directions"
-    return RefusedError(Issue("error", "axis-changes", 0, sentence, remedy))
 
 
 class Watch:
