@@ -1,6 +1,7 @@
 // What links the views: one chosen row of the samples, told to all of them.
 
 const PASS = "pass";
+const MOST_ERRORS = 50;  // that are marked in the views
 
 class Page {
   constructor(columns, lines, solids, meshes, part) {
@@ -32,13 +33,19 @@ class Page {
       byId("scene-note").textContent = "No 3D view: this browser offers no WebGL.";
     }
     if (this.scene) this.addBodies();
-    this.plots = new Plots(byId("plots"), this.columns, (row) => this.select(row), (stretch) => this.lookAt(stretch));
+    const errors = this.errorRows();
+    this.plots = new Plots(byId("plots"), this.columns, errors, (row) => this.select(row), (stretch) => this.lookAt(stretch));
     this.fillColours();
     this.fillMenu();
     this.listenToTools();
     this.listenToPrinter();
     this.paint();
-    this.select(this.worstRow());
+    if (errors.length) {
+      this.scene?.markErrors(errors);
+      byId("scene-note").textContent ||= "\u2715 error";
+      this.part?.follow();
+    }
+    this.select(errors[0] ?? this.worstRow());
   }
 
   addBodies() {
@@ -84,6 +91,17 @@ class Page {
 
   firstFeed() {
     return Math.max(this.columns.pass.findIndex((pass) => pass >= 0), 0);
+  }
+
+  // Where lines with errors move the tool: of each line the sample nearest to a joint limit.
+  errorRows() {
+    const { line, margin } = this.columns;
+    const lines = head.marked.filter(([number, severity]) => severity === "error" && this.firstOfLine.has(number));
+    return lines.slice(0, MOST_ERRORS).map(([number]) => {
+      let worst = this.firstOfLine.get(number);
+      for (let i = worst; margin && line[i] === number; i++) if (margin[i] < margin[worst]) worst = i;
+      return worst;
+    });
   }
 
   // Where the tool bends away or is loaded most; without either, where it first cuts.

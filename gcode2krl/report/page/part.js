@@ -104,7 +104,7 @@ class Part {
     robot.checked = false;
     if (page.robot) page.robot.wanted = false;
     robot.addEventListener("change", () => { isFirst = false; });
-    const follow = () => {
+    const follow = this.follow = () => {
       byId("show-finished").checked = false;
       if (isFirst && page.robot) robot.checked = page.robot.wanted = true;
       isFirst = false;
