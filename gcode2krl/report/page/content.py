@@ -475,7 +475,8 @@ def _refusal(findings: Told, verdict: str) -> str:
     first = findings.findings[0] if findings.findings else None
     why = f": {first.first.message}" if first is not None else ""
     place = f" (line {first.first.line})" if first is not None and first.first.line > 0 else ""
-    more = sum(one.first.severity == "error" for one in findings.findings) - 1
+    listed = [issue for one in findings.findings for issue in one.issues]
+    more = sum(issue.severity == "error" for issue in (*listed, *findings.left_out)) - 1
     place += f", and {more} more error{'s' if more > 1 else ''}" if more > 0 else ""
     start = "No program was written" if verdict == "refused" else "The input is not understood"
     return f"{start}{why}{place}"

@@ -93,14 +93,19 @@ class Page {
     return Math.max(this.columns.pass.findIndex((pass) => pass >= 0), 0);
   }
 
-  // Where lines with errors move the tool: of each line the sample nearest to a joint limit.
+  // Where lines with errors move the tool: of each line the sample that is farthest beyond a joint limit, else that nearest to a hit.
   errorRows() {
-    const { line, margin } = this.columns;
+    const { line, margin, clearance } = this.columns;
     const lines = head.marked.filter(([number, severity]) => severity === "error" && this.firstOfLine.has(number));
     return lines.slice(0, MOST_ERRORS).map(([number]) => {
-      let worst = this.firstOfLine.get(number);
-      for (let i = worst; margin && line[i] === number; i++) if (margin[i] < margin[worst]) worst = i;
-      return worst;
+      const first = this.firstOfLine.get(number);
+      const lowest = (values) => {
+        let at = first;
+        for (let i = first; values && line[i] === number; i++) if (values[i] < values[at]) at = i;
+        return at;
+      };
+      const beyond = lowest(margin);
+      return margin?.[beyond] < 0 ? beyond : lowest(clearance);
     });
   }
 
@@ -136,12 +141,13 @@ class Page {
     const { columns, row } = this;
     const parts = [`${columns.time[row].toFixed(2)} s`];
     if (columns.line[row] > 0) parts.push(`line ${columns.line[row]}`);
-    parts.push(["x", "y", "z"].map((axis) => `${axis.toUpperCase()} ${columns[axis][row].toFixed(2)}`).join(" "));
     const near = this.robot?.nearest(row);
+    if (near?.gap <= 0) parts.push(`${near.who} hits ${near.what}`);
+    parts.push(["x", "y", "z"].map((axis) => `${axis.toUpperCase()} ${columns[axis][row].toFixed(2)}`).join(" "));
     head.quantities.filter(({ name }) => name !== "clearance").forEach(({ name, label, unit }) => {
       parts.push(`${name === "margin" ? "margin" : label} ${rounded(columns[name][row])}${unit === "°" ? "" : " "}${unit}`);
     });
-    if (near) parts.push(near.gap <= 0 ? `${near.who} hits ${near.what}` : `${near.who} ${rounded(near.gap)} mm from ${near.what}`);
+    if (near?.gap > 0) parts.push(`${near.who} ${rounded(near.gap)} mm from ${near.what}`);
     if (this.robot && !this.robot.reached) parts.push("out of the robot's reach");
     return parts.join("  ·  ");
   }
