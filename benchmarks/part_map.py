@@ -46,7 +46,7 @@ def part_of(name: str, cell: Cell, dt_s: float) -> tuple[Prediction, PartHistory
 def say_volume(name: str, prediction: Prediction, history: PartHistory) -> None:
     assert prediction.motion is not None
     removal = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False)
-    raw, left = history.volume_mm3(-1), removal.part.volume_mm3
+    raw, left = history.volume_mm3(-1), removal.left.volume_mm3
     shown = history.volume_mm3()
     stands, cut = 100.0 * (shown / left - 1.0), 100.0 * ((raw - shown) / (raw - left) - 1.0)
     print(

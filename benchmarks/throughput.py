@@ -427,7 +427,7 @@ def cells_of(part: str) -> Cells:
     motion = gcode2krl.plan_motion(gcode2krl.set_targets(toolpath, cell), cell)
     removal = milling.remove(toolpath, motion, cell)
     samples.append(len(motion))
-    height = np.ascontiguousarray(removal.part.height_mm)
+    height = np.ascontiguousarray(removal.left.height_mm)
     lower, best_s = height - 1.0, math.inf
     for _ in range(5):
         start = time.process_time()
@@ -435,7 +435,7 @@ def cells_of(part: str) -> Cells:
         best_s = min(best_s, time.process_time() - start)
     looked_at, lowered = (int(sum(grid.counted[k] for grid in grids)) for k in (0, 1))
     lowest_per_s = height.size / max(best_s, 1e-6)
-    return Cells(looked_at, lowered, sum(samples), sum(seconds), lowest_per_s, removal.part.cell_mm[0])
+    return Cells(looked_at, lowered, sum(samples), sum(seconds), lowest_per_s, removal.left.cell_mm[0])
 
 
 def print_cells(part: Path, name: str, folder: Path) -> Cells | None:

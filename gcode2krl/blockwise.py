@@ -93,7 +93,7 @@ def plan_course(
         slowed = slowed / np.maximum(seen.share, 1.0)
         slower = krc4.with_speed(chain, slowed)
         profile = krc4.plan(slower, cell)
-        lost_s = profile.total_s - planned_s
+        lost_s = max(profile.total_s - planned_s, 0.0)  # slower moves may round their corners faster
         worst = int(np.argmin(slowed / chain.speed_mm_s))
         issues = [issue for issue in issues if issue.code != "joint-speed"]
         sentence = f"joint speed limits slow the robot down: {lost_s:.2f} s more, most at this line"

@@ -160,6 +160,16 @@ def _part(prediction: Prediction) -> "Figure":
     return part_figure(prediction, history_of(prediction.toolpath, prediction.motion, prediction.cell))
 
 
+def against_nominal(prediction: Prediction, above_mm: Floats, at_mm: Floats | None) -> "Figure":
+    """Return the finished part coloured by its difference to the nominal one, see `report.part_error`."""
+    from gcode2krl.cutting import history_of
+    from gcode2krl.report.part import nominal_figure
+
+    assert prediction.motion is not None
+    history = history_of(prediction.toolpath, prediction.motion, prediction.cell)
+    return nominal_figure(prediction, history, above_mm, at_mm)
+
+
 def _shares(prediction: Prediction) -> tuple[tuple[str, ...], Floats]:
     """Return the virtual joints and how much each adds along the deflection (m, 10)."""
     from gcode2krl.cell.sections import VIRTUAL_JOINTS

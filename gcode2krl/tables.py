@@ -44,7 +44,7 @@ class Restart:
     way_rows: int = 0
     """Rows of the Toolpath, from row 1 on, that lead to the first position."""
     left: object = field(default=None, repr=False)
-    """`cutting.HeightField` of the material that the lines before have left; None: the raw part."""
+    """The material that the lines before have left, `cutting.height_field` or `cutting.dexels`; None: raw."""
 
 
 @dataclass(frozen=True)

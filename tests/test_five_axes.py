@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 from gcode2krl import Gcode2KrlError, load_cell, predict, read_gcode, set_targets, write_krl
 from gcode2krl.cell.sections import Machine
 from gcode2krl.cutting import history_of, remove
-from gcode2krl.errors import RefusedError
+from gcode2krl.cutting.surface import dexels_to_mesh
+from gcode2krl.pipeline import predict_toolpath
+from gcode2krl.restart.material import restarted
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "five_axis"
 PART, CELL = EXAMPLE / "five_axis.nc", EXAMPLE / "cell.toml"
@@ -140,11 +142,45 @@ def test_predict_has_forces_and_says_what_is_less_sure():
     assert np.isfinite(prediction.deflection.deflection_base_mm[on_cone]).all()
 
 
-def test_what_needs_one_height_is_refused(tmp_path):
+def test_the_part_is_written_as_a_closed_mesh():
     cell = load_cell(CELL)
     prediction = predict(PART, cell)
-    with pytest.raises(RefusedError, match="the tool axis changes"):
-        _ = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).part
+    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).left
+    mesh = dexels_to_mesh(left)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(left.volume_mm3, rel=0.003)
+    np.testing.assert_allclose(mesh.bounds[0], left.low_mm, atol=0.1)
+
+
+@pytest.mark.parametrize("from_line", [18, 30])
+def test_a_restart_goes_on_with_what_is_left(tmp_path, from_line):
+    """Its forces are those of the whole program from there on, and so is the part that it leaves."""
+    cell = load_cell(CELL)
+    whole = predict(PART, cell)
+    begun = restarted(read_gcode(PART, cell), from_line, cell)
+    rest = predict_toolpath(begun, cell)
+    left = [remove(one.toolpath, one.motion, cell, is_checked=False).left for one in (whole, rest)]
+    assert left[1].volume_mm3 == pytest.approx(left[0].volume_mm3, rel=1e-4)
+    met = [
+        {i.line for i in one.issues if i.code in ("rapid-in-stock", "stock-untouched")}
+        for one in (whole, rest)
+    ]
+    assert met[1] <= met[0]
+    largest_N = []
+    for one in (whole, rest):
+        line = one.toolpath.source_line[one.motion.move]
+        size_N = np.linalg.norm(one.forces.force_base_N, axis=1)
+        largest_N.append([size_N[line == k].max(initial=0.0) for k in range(from_line + 1, 45)])
+    np.testing.assert_allclose(largest_N[1], largest_N[0], rtol=0.03, atol=5.0)
+    way_mm = begun.position_mm[1 : begun.restart.way_rows + 1]
+    axis = begun.axis[1]
+    np.testing.assert_allclose(np.cross(way_mm - way_mm[-1], axis), 0.0, atol=1e-9)
+    np.testing.assert_array_equal(
+        begun.axis[1 : begun.restart.way_rows + 1], np.broadcast_to(axis, way_mm.shape)
+    )
+    history = history_of(rest.toolpath, rest.motion, cell)
+    assert history.volume_mm3() == pytest.approx(left[0].volume_mm3, rel=0.005)
+    assert history.volume_mm3(-1) < 0.99 * history_of(whole.toolpath, whole.motion, cell).volume_mm3(-1)
 
 
 def test_the_part_is_shown_with_its_error():

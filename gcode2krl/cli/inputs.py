@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "STANDARD",
     "VERBOSE",
+    "allow_option",
     "cell_files",
     "common_options",
     "effect_files",
@@ -139,6 +140,16 @@ def gcode_options(function: Any) -> Any:
     ):
         function = option(function)
     return function
+
+
+def allow_option(function: Any) -> Any:
+    """Add --allow to a command that judges what it found."""
+    return click.option(
+        "--allow",
+        multiple=True,
+        metavar="CODE[:[FILE:]LINE]",
+        help="Allow one finding, or all of a code; may be repeated.",
+    )(function)
 
 
 def simplify_option(function: Any) -> Any:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 from gcode2krl.errors import Issue
 
 if TYPE_CHECKING:
+    import trimesh
+
+    from gcode2krl.arrays import Floats
     from gcode2krl.cutting.nominal import Comparison
     from gcode2krl.prediction import Prediction
 
@@ -25,14 +28,29 @@ def compared(prediction: "Prediction", nominal: str) -> "Comparison":
     removal cannot run.
     """
     from gcode2krl.cutting import remove
+    from gcode2krl.cutting.height_field import HeightField
     from gcode2krl.cutting.nominal import compare
+    from gcode2krl.cutting.nominal_turned import compare_turned
     from gcode2krl.cutting.raw_part import load_mesh
 
     mesh = load_mesh(Path(nominal), "nominal part")
-    motion = prediction.motion
+    motion, cell = prediction.motion, prediction.cell
     if motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
-    return compare(remove(prediction.toolpath, motion, prediction.cell, is_checked=False), motion, mesh)
+    removal = remove(prediction.toolpath, motion, cell, is_checked=False)
+    if isinstance(removal.left, HeightField):
+        return compare(removal, motion, mesh)
+    return compare_turned(removal.left, motion, cell, mesh, _nearest_on)
+
+
+def _nearest_on(mesh: "trimesh.Trimesh", places_mm: "Floats") -> "Floats":
+    """Return the places (n, 3) on a mesh that are nearest to places (n, 3)."""
+    import numpy as np
+
+    from gcode2krl.collision import scene
+    from gcode2krl.collision.gaps import nearest_on
+
+    return nearest_on(scene.mesh(np.asarray(mesh.triangles)), places_mm)
 
 
 def with_comparison(prediction: "Prediction", comparison: "Comparison", nominal: str) -> "Prediction":
@@ -118,4 +136,4 @@ def on_page(comparison: "Comparison") -> dict[str, Any]:
     plain = as_dict(comparison)
     for difference, shown in zip(comparison.differences, plain["differences"], strict=True):
         shown |= {"row": difference.row, "triangles_mm": np.asarray(difference.solid.triangles)}
-    return plain | {"above_mm": comparison.above_mm}
+    return plain | {"above_mm": comparison.above_mm, "at_mm": comparison.at_mm}

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gcode2krl.cli.allowed import as_allowed, with_allowed
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
+    allow_option,
     cell_files,
     common_options,
     effect_files,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 _MESHES = (".stl", ".ply", ".obj", ".off", ".3mf", ".glb")
 _CORNERS = "corners.csv"
+_NOMINAL = "part_nominal"
 
 
 @click.command(
@@ -51,6 +54,7 @@ _CORNERS = "corners.csv"
 @gcode_options
 @simplify_option
 @job_option
+@allow_option
 @click.option(
     "--dt", "dt_s", type=float, metavar="S", help="Sample time; default: the controller's cycle (0.012)."
 )
@@ -84,6 +88,7 @@ def command(
     simplify_mm: float | None,
     job_path: str | None,
     tools_path: str | None,
+    allow: tuple[str, ...],
     dt_s: float | None,
     csv: bool,
     plot: bool,
@@ -96,7 +101,8 @@ def command(
 ) -> int:
     """Predict what the robot will do: path, timing, joints, cutting forces, deflection.
 
-    Findings that would refuse a program are only reported here.
+    Findings that would refuse a program are only reported here; those of --allow as the warnings that they
+    are to a program.
     """
     from gcode2krl.cli.loads import load_lines
     from gcode2krl.prediction.forecast import load_figures
@@ -143,6 +149,8 @@ def command(
             comparison = compared(prediction, nominal) if nominal is not None else None
             if comparison is not None and nominal is not None:
                 prediction = with_comparison(prediction, comparison, nominal)
+            by_name = () if "allow" in project.options else allow
+            prediction = with_allowed(prediction, by_name, project.options.get("allow", ()))
             corners = corner_table(prediction)
             files = prediction.save(folder, csv=csv, inputs=inputs)
             files.append(_save_corners(corners, folder, inputs))
@@ -151,7 +159,7 @@ def command(
                 files.append(_save_part(prediction, Path(part_mesh), inputs))
             if plot:
                 begin("figures")
-                files += _draw(prediction, folder, inputs)
+                files += _draw(prediction, comparison, folder, inputs)
     except Gcode2KrlError as error:
         return console.refused(error, ["moves", "time_s", "path_mm"], part)
     motion = prediction.motion
@@ -174,10 +182,10 @@ def command(
                 **({"nominal": as_dict(comparison)} if comparison is not None else {}),
                 **project.record,
             },
-            prediction.issues,
+            as_allowed(prediction),
             files=files,
         )
-    console.findings(prediction.issues, part)
+    console.findings(as_allowed(prediction), part)
     console.say(f"{part} -> {folder}: {', '.join(file.name for file in files)}")
     console.say(f"  {len(motion)} samples, {motion.time_s[-1]:.2f} s, {motion.path_mm[-1] / 1000.0:.3f} m")
     cycle_s = prediction.cell.controller.cycle_s
@@ -200,7 +208,7 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 
     refuse_foreign(folder)
     tables = [f"{name}{kind}" for name in ("toolpath", "targets", "motion") for kind in (".parquet", ".csv")]
-    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in FIGURES)]
+    names = [*tables, RECORD, _CORNERS, *FILES.values(), *(f"{name}.png" for name in (*FIGURES, _NOMINAL))]
     require_folder(folder, names, inputs)
     if part_mesh is None:
         return
@@ -214,12 +222,15 @@ def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) ->
 def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path:
     """Write the machined stock as a mesh."""
     from gcode2krl.cutting import remove
+    from gcode2krl.cutting.height_field import HeightField
     from gcode2krl.cutting.raw_part import to_mesh
+    from gcode2krl.cutting.surface import dexels_to_mesh
     from gcode2krl.files import write_together
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
-    mesh = to_mesh(remove(prediction.toolpath, prediction.motion, prediction.cell).part)
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell).left
+    mesh = to_mesh(left) if isinstance(left, HeightField) else dexels_to_mesh(left)
     content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
     write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)
     return file
@@ -250,12 +261,17 @@ def _save_corners(corners: dict[str, Any], folder: Path, inputs: list[Path]) -> 
     return file
 
 
-def _draw(prediction: "Prediction", folder: Path, inputs: list[Path]) -> list[Path]:
-    """Draw every stage that ran; returns the files."""
-    from gcode2krl.figures import figures_of
+def _draw(
+    prediction: "Prediction", comparison: "Comparison | None", folder: Path, inputs: list[Path]
+) -> list[Path]:
+    """Draw every stage that ran, and the part against the nominal one; returns the files."""
+    from gcode2krl.figures import against_nominal, figures_of
     from gcode2krl.report.figures import save_figures
 
-    return save_figures(figures_of(prediction), folder, inputs)
+    figures = figures_of(prediction)
+    if comparison is not None:
+        figures[_NOMINAL] = against_nominal(prediction, comparison.above_mm, comparison.at_mm)
+    return save_figures(figures, folder, inputs)
 
 
 def _folder(part: str, output: str | None) -> Path:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gcode2krl.cli.allowed import as_allowed
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import VERBOSE, existing
@@ -62,6 +63,7 @@ def command(
             part = part_of(prediction)
             content = content_of(
                 prediction,
+                issues=as_allowed(prediction),
                 text=text,
                 stock_mm=stock_mm,
                 meshes_mm=meshes_mm,
@@ -72,7 +74,7 @@ def command(
     except Gcode2KrlError as error:
         return console.refused(error)
     if as_json:
-        return console.record({}, prediction.issues, files=[file])
+        return console.record({}, as_allowed(prediction), files=[file])
     if mesh is None and KEY in prediction.inputs:
         console.hint(
             f"{prediction.inputs[KEY]} is not at hand: the page does not compare with it; --nominal names it"

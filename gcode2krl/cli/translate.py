@@ -10,6 +10,7 @@ from gcode2krl.cli.console import Console
 from gcode2krl.cli.help_examples import examples
 from gcode2krl.cli.inputs import (
     STANDARD,
+    allow_option,
     common_options,
     gcode_options,
     job_option,
@@ -46,12 +47,7 @@ if TYPE_CHECKING:
 @simplify_option
 @job_option
 @click.option("--name", help="Program name, where -o names no file; a controller needs both alike.")
-@click.option(
-    "--allow",
-    multiple=True,
-    metavar="CODE[:[FILE:]LINE]",
-    help="Allow one finding, or all of a code; may be repeated.",
-)
+@allow_option
 @click.option("--strict", is_flag=True, help="Warnings refuse the program too.")
 @click.option("--no-guard", is_flag=True, help="Leave out the checks at the program's start.")
 @click.option(

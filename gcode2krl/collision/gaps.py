@@ -8,6 +8,7 @@ from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compiled.inputs import shaped
 
 _gaps = core_function("collision_gaps", FLOATS, FLOAT, OBSTACLES, OUT_FLOATS, OUT_FLOATS)
+_nearest = core_function("collision_nearest", FLOATS, OBSTACLES, OUT_FLOATS)
 _segments = core_function("collision_segments", FLOATS, OUT_FLOATS)
 _bodies = core_function("collision_bodies", FLOATS, FLOATS, BODIES, OUT_FLOATS)
 
@@ -22,6 +23,14 @@ def obstacle_gaps(ends_mm: Floats, radius_mm: float, obstacle: Obstacles) -> tup
     gap, place = np.empty(len(ends)), np.empty((len(ends), 3))
     _gaps(ends, float(radius_mm), obstacle, gap, place)
     return gap, place
+
+
+def nearest_on(surface: Obstacles, places_mm: Floats) -> Floats:
+    """Return the nearest places (n, 3) on the surface of a mesh of places (n, 3)."""
+    places = shaped("places_mm", places_mm, -1, 3)
+    nearest = np.empty_like(places)
+    _nearest(places, surface, nearest)
+    return nearest
 
 
 def segment_distances(ends_mm: Floats, other_mm: Floats) -> Floats:

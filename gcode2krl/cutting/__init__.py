@@ -1,6 +1,6 @@
 """Motion and stock to Forces: cutters, height field, engagement, force laws."""
 
-from gcode2krl.cutting.entry import depth_in_material, highest_below
+from gcode2krl.cutting.entry import depth_in_material, free_above_mm
 from gcode2krl.cutting.force import ToolLoad, cutting_load, mean_force
 from gcode2krl.cutting.history import history_of
 from gcode2krl.cutting.milling import (
@@ -13,7 +13,7 @@ from gcode2krl.cutting.milling import (
     force_basis,
     mean_cut,
     no_forces,
-    raw_field,
+    raw_material,
     remove,
 )
 from gcode2krl.cutting.outlook import Outlook, Watch, outlook_of
@@ -31,12 +31,12 @@ __all__ = [
     "cutting_load",
     "depth_in_material",
     "force_basis",
-    "highest_below",
+    "free_above_mm",
     "history_of",
     "mean_cut",
     "mean_force",
     "no_forces",
     "outlook_of",
-    "raw_field",
+    "raw_material",
     "remove",
 ]

@@ -60,6 +60,18 @@ class Dexels(NamedTuple):
         """Volume of the material."""
         return float(_volume(self))
 
+    @property
+    def size_mm(self) -> Floats:
+        """Size (3,) of the box around the raw part."""
+        size: Floats = self.cells * self.cell_mm
+        return size
+
+    @property
+    def top_mm(self) -> float:
+        """The highest place of the material, -inf where there is none."""
+        blocks = -(-int(self.cells[0]) // SIDE) * -(-int(self.cells[1]) // SIDE)
+        return float(self.bound[-blocks:, 1].max())
+
     def copy(self) -> "Dexels":
         """Return dexels that can be cut without changing these."""
         return self._replace(**{name: getattr(self, name).copy() for name in _CUT})
@@ -68,6 +80,34 @@ class Dexels(NamedTuple):
         """Return the same with room for twice as many ends; raises where a ray has all that it may have."""
         _refuse_more_than(MOST - 1, self.filled)
         return self._replace(ends=_twice(self.ends), facing=_twice(self.facing))
+
+    def stretches(self) -> tuple[Ints, Floats]:
+        """Return the ray (s,) of each stretch of material, rising, and both its ends (s, 2) in mm."""
+        ray = np.repeat(np.arange(len(self.filled)), self.filled)
+        after = np.cumsum(self.filled)
+        begin = self.first[ray] + 2 * (np.arange(len(ray)) - (after - self.filled)[ray])
+        return ray, self.ends[begin[:, None] + [0, 1]].astype(np.float64)
+
+    def coarser(self, cell_mm: float) -> "Dexels":
+        """Return the same material on fewer rays, each as the nearest of these."""
+        low_mm, size_mm, cells = _grid(
+            np.array([self.low_mm, self.low_mm + self.cells * self.cell_mm]), cell_mm
+        )
+        firsts, rays = _firsts(self.cells), []
+        for axis in range(3):
+            column, row = (
+                ((np.arange(cells[k]) + 0.5) * size_mm[k] / self.cell_mm[k]).astype(np.int64)
+                for k in ((axis + 1) % 3, (axis + 2) % 3)
+            )
+            rays.append((firsts[axis] + row[:, None] * self.cells[(axis + 1) % 3] + column).ravel())
+        ray = np.concatenate(rays)
+        made = _with_ends(low_mm, size_mm, cells, self.filled[ray].astype(np.int64))
+        ends = 2 * made.filled.astype(np.int64)
+        number = np.arange(ends.sum()) - np.repeat(np.cumsum(ends) - ends, ends)
+        to, of = (np.repeat(first.astype(np.int64), ends) + number for first in (made.first, self.first[ray]))
+        made.ends[to], made.facing[to] = self.ends[of], self.facing[of] & 0xFFFFFF  # without a stamp
+        _bound(made)
+        return made
 
     def depths(self, places_mm: Floats) -> Floats:
         """Return how deep in mm places (n, 3) are in material, negative outside, to two cells."""
@@ -113,15 +153,8 @@ def dexel_block(box_mm: Floats, cell_mm: float) -> Dexels:
 def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     """Return a closed mesh as dexels: each ray begins and ends where it passes a triangle."""
     low_mm, size_mm, cells = _grid(np.array(mesh.bounds, dtype=np.float64), cell_mm)
-    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
-    firsts, crossings = _firsts(cells), []
-    for axis in range(3):
-        ray, at, normal = _crossed(triangles, axis, low_mm, size_mm, cells)
-        crossings.append((ray + firsts[axis], at, normal))
-    ray, at, normal = (np.concatenate(column) for column in zip(*crossings, strict=True))
-    order = np.lexsort((at, ray))
-    ray, at, normal = ray[order], at[order], normal[order]
-    count = np.bincount(ray, minlength=firsts[3])
+    ray, at, normal = crossings(mesh, low_mm, size_mm, cells)
+    count = np.bincount(ray, minlength=_firsts(cells)[3])
     _refuse_more_than(MOST, count // 2)
     dexels = _with_ends(low_mm, size_mm, cells, -(-count // 2))
     dexels.filled[:] = count // 2
@@ -129,6 +162,20 @@ def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     dexels.ends[place], dexels.facing[place] = at, _packed(normal)
     _bound(dexels)
     return dexels
+
+
+def crossings(
+    mesh: "trimesh.Trimesh", low_mm: Floats, cell_mm: Floats, cells: Ints
+) -> tuple[Ints, Floats, Floats]:
+    """Return where rays of dexels pass a mesh: rays (c,) and places, both rising, and normals (c, 3)."""
+    triangles = np.ascontiguousarray(mesh.triangles, dtype=np.float64)
+    firsts, of_fields = _firsts(cells), []
+    for axis in range(3):
+        ray, at, normal = _crossed(triangles, axis, low_mm, cell_mm, cells)
+        of_fields.append((ray + firsts[axis], at, normal))
+    ray, at, normal = (np.concatenate(column) for column in zip(*of_fields, strict=True))
+    order = np.lexsort((at, ray))
+    return ray[order], at[order], normal[order]
 
 
 def _crossed(

@@ -22,8 +22,9 @@ from gcode2krl.compiled.core import (
 )
 from gcode2krl.cutting.engagement import outlines_of
 from gcode2krl.cutting.height_field import HeightField
-from gcode2krl.cutting.milling import raw_field, shaped
+from gcode2krl.cutting.milling import shaped
 from gcode2krl.cutting.outlook import outlook_of, turned
+from gcode2krl.cutting.raw_part import height_field_of
 from gcode2krl.cutting.records import taken
 from gcode2krl.cutting.surface import surface_history
 from gcode2krl.cutting.sweep import BALL, GRID, LANES, PATH, Grid, Path
@@ -63,14 +64,13 @@ def history_of(
     NotUnderstoodError
         Where the stock cannot be read.
     """
-    outlook = outlook_of([motion])
+    outlook = outlook_of([motion]).on(toolpath.restart.left if toolpath.restart is not None else None)
     if outlook.turns:
         slots, most = (_SHORTEST_S, 1.0 / _SLOTS), (most_blocks, most_events)
         return surface_history(toolpath, motion, cell, outlook, slots, most)
-    fine, to_field = raw_field(toolpath, motion, cell)
-    field, side = _coarse(fine, most_blocks)
+    tools, to_field = [cell.tool[number] for number in outlook.numbers], outlook.to_field
+    field, side = _coarse(height_field_of(toolpath, cell, to_field, tools), most_blocks)
     grid, raw_mm = field.grid(0, 0, field.height_mm.shape[1]), _means(field, side)
-    tools = [cell.tool[number] for number in outlook.numbers]
     path, sample = _path(motion, to_field, outlook.numbers, outlines_of(tools), toolpath)
     events, mean_mm, last = _cut_out(grid, path, motion.time_s[sample], side, raw_mm, most_events)
     origin_mm, size_mm = field.origin_mm, field.cell_mm * side

@@ -17,7 +17,7 @@ from gcode2krl.cutting.findings import Cut, Findings
 from gcode2krl.cutting.force import peak_force
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.cutting.law import feed_per_tooth, law_array, linear_edge_law
-from gcode2krl.cutting.outlook import Outlook, axis_changes, outlook_of, turned
+from gcode2krl.cutting.outlook import Outlook, outlook_of, turned
 from gcode2krl.cutting.raw_part import dexels_of, height_field_of
 from gcode2krl.cutting.reading import Result
 from gcode2krl.cutting.records import copied, followed, taken
@@ -154,13 +154,6 @@ class Removal:
     to_field: Floats
     """(3, 3) rotation from ``$BASE`` to its frame."""
 
-    @property
-    def part(self) -> HeightField:
-        """What is left as a height field; raises `RefusedError` where the tool axis turns."""
-        if isinstance(self.left, HeightField):
-            return self.left
-        raise axis_changes("the finished part has no single height above a place")
-
 
 def cut(toolpath: Toolpath, motion: Motion, cell: Cell) -> Forces:
     """Return the force that the cutter feels at every sample, from removing the stock along the motion.
@@ -219,7 +212,7 @@ def remove(
     """
     if cell.material is None:
         raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
-    outlook = outlook_of(block for block, _ in blocks_of(motion, rows))
+    outlook = outlook_of(block for block, _ in blocks_of(motion, rows)).on(_left_before(toolpath))
     dt_s = float(motion.time_s[1] - motion.time_s[0]) if len(motion) > 1 else 0.0
     milling = Milling(
         toolpath, cell, outlook, dt_s, law, is_checked=is_checked, nodes_per_diameter=nodes_per_diameter
@@ -302,6 +295,7 @@ class Milling:
         material = cell.material
         if material is None:
             raise input_error("material-missing", "the cell names no material", "give [material] in the cell")
+        outlook = outlook.on(_left_before(toolpath))
         self._toolpath, self._to_field = toolpath, outlook.to_field
         self._law = law_array(material) if law is None else law
         self._band = material.relative_band
@@ -318,7 +312,8 @@ class Milling:
             self._band = math.hypot(self._band, TURNED_BAND)
             self._low_mm, self._high_mm = dexels.low_mm, dexels.low_mm + dexels.cells * dexels.cell_mm
             stock = None if self._is_guessed else cell.stock
-            checks = TurnedStockChecks(self._tools, outlook.numbers, stock, self._low_mm, self._high_mm)
+            corners = self._low_mm, self._high_mm
+            checks = TurnedStockChecks(self._tools, outlook.numbers, stock, *corners, is_raw)
         else:
             field = height_field_of(toolpath, cell, outlook.to_field, self._tools)
             self._before, self._is_guessed = _uncut(field), field.guessed
@@ -531,15 +526,21 @@ class _Checks:
         return tuple(sorted(issues, key=lambda issue: issue.line))
 
 
-def raw_field(toolpath: Toolpath, motion: Motion, cell: Cell) -> tuple[HeightField, Floats]:
-    """Return the material before the first cut, as fine as the tools of the motion need.
+def raw_material(toolpath: Toolpath, motion: Motion, cell: Cell) -> HeightField | Dexels:
+    """Return the material before the first cut, as fine as the tools of the motion need; dexels if it turns.
 
-    Second the rotation (3, 3) from ``$BASE`` to its frame. Raises what `cut` raises.
+    Raises what `cut` raises.
     """
-    outlook = outlook_of([motion])
-    outlook.require_one_axis("what one program leaves to another is not known")
+    outlook = outlook_of([motion]).on(_left_before(toolpath))
     tools = [cell.tool[number] for number in outlook.numbers]
-    return height_field_of(toolpath, cell, outlook.to_field, tools), outlook.to_field
+    if outlook.turns:
+        return dexels_of(toolpath, cell, tools)[0]
+    return height_field_of(toolpath, cell, outlook.to_field, tools)
+
+
+def _left_before(toolpath: Toolpath) -> object:
+    """Return what the lines before a restart have left."""
+    return toolpath.restart.left if toolpath.restart is not None else None
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:

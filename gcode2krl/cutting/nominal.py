@@ -19,17 +19,19 @@ from gcode2krl.cutting.solids import mesh_of, solid_of
 from gcode2krl.tables import Motion
 
 if TYPE_CHECKING:
+    import manifold3d
     import trimesh
 
 TOLERANCE_MM = 0.1
 """Assumed: what a finishing cut leaves. The height field itself is exact to its cells and some 0.01 mm."""
 MOST_SOLIDS = 20
 """Largest differences of each kind that are made into solids."""
-_FEWEST_CELLS = 4
+FEWEST_CELLS = 4
+"""Of a difference; fewer are none."""
 _SOLID_CELLS = 40_000
 _BELOW_MM = 1.0
 _FLAT_MM = 0.01
-_NEARLY = 0.98
+NEARLY = 0.98
 """Of the cells that are as deep as this share of the deepest, the middle one is the place."""
 
 Kind = Literal["gouge", "rest"]
@@ -62,7 +64,9 @@ class Comparison:
     """Of all, also of those left out."""
     above_mm: Floats
     """(r, c) by how much the cells of the finished part are above the nominal one, below 0 in gouges; 0 where
-    they do not differ for sure."""
+    they do not differ for sure. Where the tool axis turns (n,), of the places ``at_mm``."""
+    at_mm: Floats | None = None
+    """(n, 3) places on the finished surface that differ, in ``$BASE``; None: all cells."""
 
 
 def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Comparison:
@@ -73,7 +77,9 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     turn = np.eye(4)
     turn[:3, :3] = removal.to_field
     wanted = mesh_of(solid_of(nominal)).apply_transform(turn)
-    have, want = _heights(removal.part, wanted)
+    part = removal.left
+    assert isinstance(part, HeightField), "of dexels see nominal_turned"
+    have, want = _heights(part, wanted)
     differences: list[Difference] = []
     left_out: dict[Kind, int] = {}
     volume_mm3: dict[Kind, float] = {}
@@ -83,11 +89,11 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     )
     for kind, depth_mm in kinds:
         judged = want + (depth_mm if kind == "rest" else -depth_mm)
-        places, volumes = _places(depth_mm > 0.0, depth_mm * removal.part.cell_mm.prod())
+        places, volumes = _places(depth_mm > 0.0, depth_mm * part.cell_mm.prod())
         volume_mm3[kind], left_out[kind] = float(sum(volumes)), max(len(places) - MOST_SOLIDS, 0)
         for number in np.argsort(-np.array(volumes), kind="stable")[:MOST_SOLIDS]:
             rows, columns, mask = places[number]
-            cut = _part_of(removal.part, rows, columns)
+            cut = _part_of(part, rows, columns)
             pair = judged[rows, columns], want[rows, columns]
             differences.append(_difference(kind, volumes[number], cut, mask, *pair, removal, motion))
     above_mm = kinds[1][1] - kinds[0][1]
@@ -131,7 +137,7 @@ def _places(cells: Bools, volume_mm3: Floats) -> tuple[list[tuple[slice, slice, 
     sums = np.bincount(number.ravel(), weights=volume_mm3.ravel(), minlength=count + 1)
     places, volumes = [], []
     for piece, box in enumerate(find_objects(number), start=1):
-        if sizes[piece] >= _FEWEST_CELLS:
+        if sizes[piece] >= FEWEST_CELLS:
             places.append((box[0], box[1], number[box] == piece))
             volumes.append(float(sums[piece]))
     return places, volumes
@@ -155,29 +161,44 @@ def _difference(
 ) -> Difference:
     """Return one difference; heights and mask (r, c) are those of the cells of ``part``."""
     depth = np.where(mask, np.abs(have - want), -1.0)
-    deepest = np.argwhere(depth >= _NEARLY * depth.max())
+    deepest = np.argwhere(depth >= NEARLY * depth.max())
     row, column = deepest[np.argmin(np.abs(deepest - deepest.mean(axis=0)).sum(axis=1))]
     middle = part.origin_mm + part.cell_mm * [column + 0.5, row + 0.5]
     place = np.array([*middle, part.height_mm[row, column]]) @ removal.to_field
     nearest = int(np.argmin(np.linalg.norm(motion.position_mm - place, axis=1)))
-    bottom_mm = float(np.minimum(have, want)[mask].min()) - _BELOW_MM
     above, under = (
-        np.pad(np.where(mask, heights, -np.inf), 1, constant_values=-np.inf)
-        for heights in (np.maximum(have, want), np.minimum(have, want))
+        np.where(mask, heights, -np.inf) for heights in (np.maximum(have, want), np.minimum(have, want))
     )
-    upper = solid_of(_columns(part, above, bottom_mm))
-    lower = solid_of(_columns(part, np.where(np.isinf(under), _highest(under), under), bottom_mm))
-    solid = mesh_of((upper - lower).simplify(_FLAT_MM))
-    solid.apply_transform(np.block([[removal.to_field.T, np.zeros((3, 1))], [0.0, 0.0, 0.0, 1.0]]))
+    solid = solid_in_base([shell(part.origin_mm, part.cell_mm, above, under, removal.to_field)])
     return Difference(kind, volume_mm3, float(depth.max()), place, nearest, solid)
 
 
-def _columns(part: HeightField, height_mm: Floats, bottom_mm: float) -> "trimesh.Trimesh":
-    """Return heights over a part and a cell around it as a closed mesh, with an empty cell around both.
+def shell(
+    origin_mm: Floats, cell_mm: Floats, above_mm: Floats, under_mm: Floats, to_field: Floats
+) -> "manifold3d.Manifold":
+    """Return what lies between heights (r, c), -inf where nothing does, turned back into ``$BASE``."""
+    bottom_mm = float(under_mm[np.isfinite(under_mm)].min()) - _BELOW_MM
+    above, under = (np.pad(heights, 1, constant_values=-np.inf) for heights in (above_mm, under_mm))
+    around = np.where(np.isinf(under), _highest(under), under)
+    upper = solid_of(_columns(origin_mm, cell_mm, above, bottom_mm))
+    lower = solid_of(_columns(origin_mm, cell_mm, around, bottom_mm - _BELOW_MM))  # no faces in one plane
+    back = np.column_stack([to_field.T, np.zeros(3)])
+    return (upper - lower).simplify(_FLAT_MM).transform(back)
+
+
+def solid_in_base(shells: "list[manifold3d.Manifold]") -> "trimesh.Trimesh":
+    """Return shells as one solid."""
+    import manifold3d
+
+    return mesh_of(manifold3d.Manifold.batch_boolean(shells, manifold3d.OpType.Add))
+
+
+def _columns(origin_mm: Floats, cell_mm: Floats, height_mm: Floats, bottom_mm: float) -> "trimesh.Trimesh":
+    """Return heights over some cells and a cell around them as a closed mesh, with an empty cell around both.
 
     A wall runs from the middle of the last cell to that of the next; below it, the lower of two meshes must
     reach a cell further.
     """
     heights = np.pad(height_mm, 1, constant_values=-np.inf).astype(np.float32)
-    around = HeightField(heights, part.origin_mm - 2.0 * part.cell_mm, part.cell_mm, bottom_mm)
+    around = HeightField(heights, origin_mm - 2.0 * cell_mm, cell_mm, bottom_mm)
     return to_mesh(around, _SOLID_CELLS)

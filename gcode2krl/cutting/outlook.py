@@ -1,13 +1,13 @@
 """What has to be known of a whole motion before the first of it is cut."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
-from gcode2krl.errors import Issue, RefusedError
+from gcode2krl.cutting.dexels import Dexels
 from gcode2krl.tables import Motion
 
 _SAME_AXIS = 1e-9
@@ -30,16 +30,9 @@ class Outlook:
     turns: bool = False
     """True where the tool axis changes: one height field cannot hold what is cut."""
 
-    def require_one_axis(self, what: str) -> None:
-        """Raise `RefusedError` where the tool axis changes; ``what`` is not done then."""
-        if self.turns:
-            raise axis_changes(what)
-
-
-def axis_changes(what: str) -> RefusedError:
-    """Return the refusal of ``what`` needs one tool axis."""
-    sentence, remedy = f"the tool axis changes: {what}", "split the program by set-up directions"
-    return RefusedError(Issue("error", "axis-changes", 0, sentence, remedy))
+    def on(self, left: object) -> "Outlook":
+        """Return what is needed to go on with what lines before have left: where those are dexels, dexels."""
+        return replace(self, to_field=np.eye(3), turns=True) if isinstance(left, Dexels) else self
 
 
 class Watch:

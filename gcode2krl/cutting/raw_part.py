@@ -78,6 +78,12 @@ def dexels_of(
     Cells are so large that at most so many squares of theirs cover the box around it.
     """
     stock, smallest_mm = cell.stock, min(tool.diameter_mm for tool in tools)
+    left_over = toolpath.restart.left if toolpath.restart is not None else None
+    if isinstance(left_over, Dexels):
+        is_stated = stock is not None and (stock.mesh is not None or stock.box_mm is not None)
+        cell_mm = float(left_over.cell_mm.max())
+        least_mm = cell_mm if most_squares is None else side_of_squares(left_over.size_mm, most_squares)
+        return (left_over.coarser(least_mm) if least_mm > cell_mm else left_over.copy()), not is_stated
     own_mm = stock.resolution_mm if stock is not None else None
     mesh = load_mesh(Path(stock.mesh)) if stock is not None and stock.mesh is not None else None
     stated_mm = stock.box_mm if stock is not None and mesh is None else None
@@ -88,10 +94,15 @@ def dexels_of(
         box_mm = guessed_box(toolpath, np.eye(3), radius_mm, edges_mm)
     cell_mm = own_mm if own_mm is not None else smallest_mm / DEXELS_PER_DIAMETER
     if most_squares is not None:
-        x, y, z = box_mm[1] - box_mm[0]
-        cell_mm = max(cell_mm, math.sqrt(2.0 * (x * y + y * z + z * x) / most_squares))
+        cell_mm = max(cell_mm, side_of_squares(box_mm[1] - box_mm[0], most_squares))
     is_guessed = mesh is None and stated_mm is None
     return (dexel_block(box_mm, cell_mm) if mesh is None else dexel_mesh(mesh, cell_mm)), is_guessed
+
+
+def side_of_squares(size_mm: Floats, most_squares: int) -> float:
+    """Return the side of so many squares that cover a box of a size (3,)."""
+    x, y, z = size_mm.tolist()
+    return math.sqrt(2.0 * (x * y + y * z + z * x) / most_squares)
 
 
 def _edges_mm(tool: Tool) -> float:

@@ -69,5 +69,5 @@ def mesh_of(solid: "manifold3d.Manifold") -> "trimesh.Trimesh":
 
     surface = solid.to_mesh64()
     return trimesh.Trimesh(
-        np.asarray(surface.vert_properties)[:, :3], np.asarray(surface.tri_verts), process=False
+        np.array(surface.vert_properties)[:, :3], np.array(surface.tri_verts), process=False
     )

@@ -146,11 +146,15 @@ class TurnedStockChecks:
         stock: Stock | None,
         low_mm: Floats,
         high_mm: Floats,
+        is_raw: bool,
     ) -> None:
-        """Take the tools, what the cell states (None: a guess), and the corners (3,) of the stock."""
+        """Take the tools, what the cell states (None: a guess), and the corners (3,) of the stock.
+
+        What is left of a raw part need not be touched.
+        """
         self._shapes, self._numbers = [shape_of(tool) for tool in tools], numbers
         self._stock, self._low_mm, self._high_mm = stock, low_mm, high_mm
-        self._touches = False
+        self._touches = not is_raw
         self._first_feed: int | None = None
         self._worst: dict[int, tuple[int, float]] = {}
         """By number of the tool: the first line below the underside, and the largest depth."""

@@ -62,8 +62,20 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
     NotUnderstoodError
         Where a release has no such form, matches nothing, or may not be given.
     """
-    as_written = _as_written(issues)
-    findings = list(as_written)
+    findings = with_releases(_as_written(issues), allow)
+    refusing = ("error", "warning") if strict else ("error",)
+    if any(issue.severity in refusing for issue in findings):
+        raise RefusedError(sorted(findings, key=lambda issue: (issue.severity != "error", issue.line)))
+    return tuple(findings)
+
+
+def with_releases(issues: Iterable[Issue], allow: Sequence[str]) -> list[Issue]:
+    """Return the findings, in their order, with those released by hand turned into warnings.
+
+    Forms of a release and `NotUnderstoodError` as in `released`; what stays an error refuses nothing here.
+    """
+    findings = list(issues)
+    as_written = _as_written(findings)
     for word in allow:
         matches = _matches(as_written, word)
         if not matches:
@@ -74,10 +86,7 @@ def released(issues: Iterable[Issue], allow: Sequence[str], strict: bool = False
         for k in matches:
             message = f"{as_written[k].message} (released by hand)"
             findings[k] = replace(as_written[k], severity="warning", message=message)
-    refusing = ("error", "warning") if strict else ("error",)
-    if any(issue.severity in refusing for issue in findings):
-        raise RefusedError(sorted(findings, key=lambda issue: (issue.severity != "error", issue.line)))
-    return tuple(findings)
+    return findings
 
 
 def matching(issues: Iterable[Issue], allow: Sequence[str]) -> tuple[str, ...]:

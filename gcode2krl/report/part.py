@@ -1,4 +1,5 @@
-"""The finished part from three sides as a matplotlib figure, with the error that the deflection leaves.
+"""The finished part from three sides as a matplotlib figure: the error that the deflection leaves, or the
+difference to the nominal part.
 
 Beside the view from above stands where it is off most, with the lines of G-code.
 """
@@ -17,7 +18,7 @@ from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.prediction import Prediction
 from gcode2krl.report.drawing import lines_of, look
 from gcode2krl.report.drawing import title as titled
-from gcode2krl.report.part_error import error_on, scale_end
+from gcode2krl.report.part_error import above_on, error_on, scale_end
 from gcode2krl.tables import Motion, PartHistory, SurfaceHistory
 
 OFF_COLOURS = "RdBu_r"
@@ -60,13 +61,36 @@ def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -
     What was cut is coloured by the error, where it is known: above 0 material is left.
     """
     error_mm = error_on(history, prediction)
-    known = error_mm is not None
-    off_mm = np.full(history.left_by.shape, np.nan) if error_mm is None else error_mm
+    if error_mm is None:
+        unknown_mm = np.full(history.left_by.shape, np.nan)
+        return _figure(prediction, history, unknown_mm, "Finished part; its error is not known", "")
+    words = "Error of the finished part by deflection"
+    return _figure(prediction, history, error_mm, words, "Error normal to the surface (mm)")
+
+
+def nominal_figure(
+    prediction: Prediction, history: PartHistory | SurfaceHistory, above_mm: Floats, at_mm: Floats | None
+) -> Figure:
+    """Draw the same, coloured by the difference to the nominal part, see `part_error.above_on`."""
+    off_mm = above_on(history, above_mm, at_mm)
+    words = "Finished part against the nominal one"
+    return _figure(prediction, history, off_mm, words, "Above the nominal part (mm)")
+
+
+def _figure(
+    prediction: Prediction,
+    history: PartHistory | SurfaceHistory,
+    off_mm: Floats,
+    words: str,
+    label: str,
+) -> Figure:
+    """Draw a part with how far it is off (r, c) or (s,), NaN where that is not known."""
+    known = bool(label)
     end_mm = scale_end(off_mm) if known else 1.0
     shade = ScalarMappable(Normalize(-end_mm, end_mm), colormaps[OFF_COLOURS])
     colours = shade.to_rgba(np.nan_to_num(off_mm))[..., :3]
     colours[np.isnan(off_mm)] = _UNKNOWN
-    colours[history.left_by < 0] = _UNCUT
+    colours[(history.left_by < 0) & ~(np.abs(np.nan_to_num(off_mm)) > 0.0)] = _UNCUT
     weight = np.where(history.left_by < 0, _LEAST_WEIGHT, 1.0)
     if isinstance(history, PartHistory):
         steep = 1.0 - np.abs(np.nan_to_num(history.normal[:, :, 2]))
@@ -89,11 +113,8 @@ def part_figure(prediction: Prediction, history: PartHistory | SurfaceHistory) -
                 lines = lines_of(prediction.toolpath, prediction.motion)
                 table = figure.add_subplot(grid[0, 1])
                 _list_worst(table, places[0], prediction.motion, lines, history, off_mm)
-            label = "Error normal to the surface (mm): above 0 material is left, below 0 too much is cut"
-            figure.colorbar(shade, ax=places, label=label, aspect=45, extend="both")
-        words = (
-            "Error of the finished part by deflection" if known else "Finished part; its error is not known"
-        )
+            whole = f"{label}: above 0 material is left, below 0 too much is cut"
+            figure.colorbar(shade, ax=places, label=whole, aspect=45, extend="both")
         figure.suptitle(titled(words, prediction.toolpath))
     return figure
 
@@ -157,9 +178,9 @@ def _list_worst(
     """
     table.set_axis_off()
     table.set_title("Where it is off most", loc="left")
-    samples = history.left_by[np.isfinite(off_mm)]
-    off_mm = off_mm[np.isfinite(off_mm)]
-    extent_mm = float(np.ptp(motion.position_mm[samples], axis=0).max())
+    is_off = np.isfinite(off_mm) & (off_mm != 0.0) & (history.left_by >= 0)
+    samples, off_mm = history.left_by[is_off], off_mm[is_off]
+    extent_mm = float(np.ptp(motion.position_mm, axis=0).max())
     chosen: list[int] = []
     for row in np.argsort(-np.abs(off_mm), kind="stable").tolist():
         away = motion.position_mm[samples[chosen]] - motion.position_mm[samples[row]]

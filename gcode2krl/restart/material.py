@@ -13,6 +13,7 @@ from gcode2krl import cutting, krc4, program
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.chain import Plan, prepare
+from gcode2krl.cutting.dexels import Dexels
 from gcode2krl.cutting.height_field import HeightField
 from gcode2krl.errors import Gcode2KrlError, Issue, RefusedError
 from gcode2krl.pipeline import plan_motion
@@ -38,7 +39,8 @@ class _Before:
     """The whole program, and what the lines before the restart have left."""
 
     plan: Plan
-    left: HeightField | None
+    left: HeightField | Dexels | None
+    """Dexels where the tool axis turns anywhere in the program."""
     to_field: Floats
     """(3, 3) from ``$BASE`` to the frame of the field."""
 
@@ -86,8 +88,7 @@ def _before(
     plan = prepare(toolpath, cell, tolerance_mm)
     try:
         motion = plan_motion(plan.targets, cell, cell.controller.cycle_s, watches=False)
-        field, to_field = cutting.raw_field(toolpath, motion, cell)
-        known = Restart(line=0, begins_line=0, left=field)
+        known = Restart(line=0, begins_line=0, left=cutting.raw_material(toolpath, motion, cell))
         done = _until(motion, krc4.build_chain(plan.targets, cell), row)
         removal = cutting.remove(replace(toolpath, restart=known), done, cell)
     except Gcode2KrlError as error:
@@ -98,7 +99,7 @@ def _before(
         return _Before(plan, None, np.eye(3)), [issue]
     # a rapid has removed what it met, so what is below it would count as cut
     collisions = [issue for issue in removal.forces.issues if issue.code == _UNTRUE]
-    return _Before(plan, removal.part, to_field), collisions
+    return _Before(plan, removal.left, removal.to_field), collisions
 
 
 def _until(motion: Motion, chain: krc4.Chain, row: int) -> Motion:
@@ -174,12 +175,12 @@ def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
     at = approached_row(before.toolpath, row)
     if before.left is None or at == row:
         return 0.0
-    tip_mm = before.to_field @ before.toolpath.position_mm[at]
     ends = np.flatnonzero(before.plan.targets.move == at)
     cdis_mm = float(before.plan.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
     slack_mm = min(0.5 * cdis_mm, _MOST_OF_CORNER_MM)  # no corner is off by more than half of CDIS
     tool = cell.tool[_tool(before, row)]
-    return cutting.depth_in_material(before.left, tip_mm, tool, slack_mm)
+    tip_mm, axis = before.toolpath.position_mm[at], before.toolpath.axis[at]
+    return cutting.depth_in_material(before.left, before.to_field, tip_mm, axis, tool, slack_mm)
 
 
 def _tool(before: _Before, row: int) -> int:
@@ -219,16 +220,13 @@ def _way(before: _Before, row: int, cell: Cell) -> Floats:
     above_mm = max(_safe_height(before, cell) - float(end[2]), 0.0) / float(axis[2])
     heights = [above_mm]
     if at != row:
-        entry_mm = _entry_mm(before, before.left, row, end, cell) if before.left is not None else above_mm
+        entry_mm = above_mm
+        if before.left is not None:
+            tool = cell.tool[_tool(before, row)]
+            free_mm = cutting.free_above_mm(before.left, before.to_field, end, axis, tool, above_mm)
+            entry_mm = max(free_mm, 0.0) + ENTRY_MM
         heights += [entry_mm, 0.0] if entry_mm < above_mm else [0.0]
     return np.asarray(end + np.outer(heights, axis))
-
-
-def _entry_mm(before: _Before, remaining: HeightField, row: int, end_mm: Floats, cell: Cell) -> float:
-    """Return how far above the start of a row, along the tool axis, the way goes on at feed."""
-    tip_mm = before.to_field @ end_mm
-    top_mm = cutting.highest_below(remaining, tip_mm, cell.tool[_tool(before, row)])
-    return max(top_mm - float(tip_mm[2]), 0.0) + ENTRY_MM
 
 
 def _safe_height(before: _Before, cell: Cell) -> float:
@@ -243,8 +241,10 @@ def _safe_height(before: _Before, cell: Cell) -> float:
     return max(heights)
 
 
-def _top(field: HeightField, to_field: Floats) -> float:
-    """Return the highest corner in ``$BASE`` of the box around a field."""
+def _top(field: HeightField | Dexels, to_field: Floats) -> float:
+    """Return the highest place of dexels, or the highest corner in ``$BASE`` of the box around a field."""
+    if isinstance(field, Dexels):
+        return field.top_mm
     rows, columns = field.height_mm.shape
     size = np.array([columns, rows]) * field.cell_mm
     top_mm = float(field.height_mm.max(initial=field.bottom_mm))

@@ -121,6 +121,8 @@ def begun_at(toolpath: Toolpath, row: int, restart: Restart, way_mm: Floats) -> 
     columns["rapid"][way], columns["feed_mm_s"][way] = True, np.inf
     if is_start:
         columns["rapid"][count], columns["feed_mm_s"][count] = False, min(toolpath.feed_mm_s[row], ENTRY_MM_S)
+    if columns["axis"].strides[0]:
+        columns["axis"][way] = toolpath.axis[approached_row(toolpath, row)]
     columns["known"][0], columns["known"][way] = False, True
     columns["exact_stop"][way], columns["tolerance_mm"][way] = True, np.nan
     columns["dwell_s"][: count + 1], columns["arc"][way], columns["machine"][way] = 0.0, -1, False

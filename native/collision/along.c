@@ -35,6 +35,14 @@ typedef struct {
     double mm, place[3];
 } Gap;
 
+/* Return the tree of an obstacle that is a mesh. */
+static Tree tree_of(const Obstacles *obstacles, int64_t of) {
+    const Tree tree = {obstacles->triangles,         obstacles->boxes,
+                       CELL(obstacles->tree, of, 0), CELL(obstacles->tree, of, 1),
+                       CELL(obstacles->tree, of, 2), CELL(obstacles->tree, of, 3)};
+    return tree;
+}
+
 static double segment_from_obstacle(const Walk *walk, int64_t of, const double *segment, double radius,
                                     double *inside, double *triangle, bool may_be_inside, double *place) {
     const Obstacles *obstacles = walk->obstacles;
@@ -64,9 +72,7 @@ static double segment_from_obstacle(const Walk *walk, int64_t of, const double *
             place[k] = number[9 + k] + number[k] * near[0] + number[3 + k] * near[1] + number[6 + k] * near[2];
         return sqrt(square) - radius;
     }
-    const Tree tree = {obstacles->triangles,         obstacles->boxes,
-                       CELL(obstacles->tree, of, 0), CELL(obstacles->tree, of, 1),
-                       CELL(obstacles->tree, of, 2), CELL(obstacles->tree, of, 3)};
+    const Tree tree = tree_of(obstacles, of);
     int64_t nearest = (int64_t)*triangle;
     const double far = tree_distance(&tree, segment, &nearest, place);
     *triangle = (double)nearest;
@@ -479,5 +485,16 @@ EXPORT void collision_segments(Floats segments, Floats far_mm) {
     for (int64_t i = 0; i < segments.rows; i++) {
         double place[3];
         AT(far_mm, i) = sqrt(segment_segment(&CELL(segments, i, 0), &CELL(segments, i, 6), place));
+    }
+}
+
+/* Write the nearest places (n, 3) on the surface of the first obstacle, a mesh, of places (n, 3). */
+EXPORT void collision_nearest(Floats places, const Obstacles *obstacles, Floats nearest) {
+    const Tree tree = tree_of(obstacles, 0);
+    int64_t triangle = 0; /* a place is near the one before it */
+    for (int64_t i = 0; i < places.rows; i++) {
+        const double *place = &CELL(places, i, 0);
+        const double segment[6] = {place[0], place[1], place[2], place[0], place[1], place[2]};
+        tree_distance(&tree, segment, &triangle, &CELL(nearest, i, 0));
     }
 }

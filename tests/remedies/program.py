@@ -177,14 +177,6 @@ CASES = {
         {"cell.toml": FIVE, "cut": A + "G0 A0 C0\nG1 X20 Y10 Z50 F600\nG1 X21 A90 F600", "tail": "M5\nM30\n"},
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z50 F600\nG1 X21 A60 F600"},
     ),
-    "axis-changes": case(
-        {
-            "words": "predict part.nc --cell cell.toml --part left.stl -o prediction",
-            "cell.toml": FIVE | {"material": {"model": "AW-2017A"}},
-            "cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 A20 X21\nG0 Z80",
-        },
-        {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z0 F600\nG1 X21\nG0 Z80"},
-    ),
     # zero points
     "offset-left": case({"cut": "G92 X0\nG1 Z-1 F300\nX30"}, {"tail": ("M30", "G92.1\nM30")}),
     "program-offset": case(

@@ -26,11 +26,11 @@ from gcode2krl.report.page.losses import (
     worst_windows,
 )
 from gcode2krl.report.page.packing import packed, packed_text
-from gcode2krl.report.page.part import drawn_part, worst_of_cells
+from gcode2krl.report.page.part import drawn_part
 from gcode2krl.report.page.passes import passes_of
 from gcode2krl.report.page.samples import PageSamples, Quantity, samples_of, samples_of_path, thinned
 from gcode2krl.report.page.sketch import robot_sketch
-from gcode2krl.report.part_error import error_on
+from gcode2krl.report.part_error import above_on, error_on
 from gcode2krl.report.tool_axes import drawn_tools
 from gcode2krl.tables import PartHistory, SurfaceHistory, Toolpath
 from gcode2krl.units import MM_PER_M, S_PER_MIN
@@ -111,6 +111,8 @@ class Compared:
     left_out: int
     """Smaller ones."""
     volume_mm3: dict[str, float]
+    how: str
+    """How both were compared."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,8 @@ def content_of(
     meshes_mm : name of an obstacle → its triangles (t, 3, 3) in its frame; those left out are not drawn.
     nominal : how the finished part differs from the nominal one: ``volume_mm3`` and ``left_out`` by kind, and
         ``differences`` with ``kind`` (gouge, rest), ``volume_mm3``, ``depth_mm``, ``place_mm``, ``row`` and
-        ``triangles_mm`` (t, 3, 3), and ``above_mm`` (r, c) over the whole part. None where nobody compared.
+        ``triangles_mm`` (t, 3, 3), and ``above_mm`` and ``at_mm`` as in `part_error.above_on`. None where
+        nobody compared.
     part : how the part comes about, None where nothing is cut or that is not known.
     """
     listed = tuple(prediction.issues if issues is None else issues)
@@ -315,7 +318,8 @@ def _with_nominal(content: Content, nominal: dict[str, Any], whole: PageSamples,
             "kinds": [deviation.kind for deviation in deviations],
         },
     }
-    compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"])
+    how = "as seen from the tool" if nominal["at_mm"] is None else "by the distance from the nominal surface"
+    compared = Compared(deviations, sum(nominal["left_out"].values()), nominal["volume_mm3"], how)
     return replace(content, head=head, solids=solids, compared=compared)
 
 
@@ -327,9 +331,7 @@ def _with_part(
     nominal: dict[str, Any] | None,
 ) -> Content:
     """Return a page with the part as it is cut."""
-    above_mm = None
-    if nominal is not None and isinstance(part, PartHistory):
-        above_mm = worst_of_cells(nominal["above_mm"], part.raw_mm.shape)
+    above_mm = None if nominal is None else above_on(part, nominal["above_mm"], nominal["at_mm"])
     head, events, cells = drawn_part(part, rows, error_on(part, prediction), above_mm)
     return replace(content, head=content.head | {"part": head}, part=events, part_cells=cells)
 
@@ -473,6 +475,9 @@ def _refusal(findings: Told, verdict: str) -> str:
     first = findings.findings[0] if findings.findings else None
     why = f": {first.first.message}" if first is not None else ""
     place = f" (line {first.first.line})" if first is not None and first.first.line > 0 else ""
+    listed = [issue for one in findings.findings for issue in one.issues]
+    more = sum(issue.severity == "error" for issue in (*listed, *findings.left_out)) - 1
+    place += f", and {more} more error{'s' if more > 1 else ''}" if more > 0 else ""
     start = "No program was written" if verdict == "refused" else "The input is not understood"
     return f"{start}{why}{place}"
 

@@ -1,6 +1,7 @@
 // What links the views: one chosen row of the samples, told to all of them.
 
 const PASS = "pass";
+const MOST_ERRORS = 50;  // that are marked in the views
 
 class Page {
   constructor(columns, lines, solids, meshes, part) {
@@ -32,13 +33,19 @@ class Page {
       byId("scene-note").textContent = "No 3D view: this browser offers no WebGL.";
     }
     if (this.scene) this.addBodies();
-    this.plots = new Plots(byId("plots"), this.columns, (row) => this.select(row), (stretch) => this.lookAt(stretch));
+    const errors = this.errorRows();
+    this.plots = new Plots(byId("plots"), this.columns, errors, (row) => this.select(row), (stretch) => this.lookAt(stretch));
     this.fillColours();
     this.fillMenu();
     this.listenToTools();
     this.listenToPrinter();
     this.paint();
-    this.select(this.worstRow());
+    if (errors.length) {
+      this.scene?.markErrors(errors);
+      byId("scene-note").textContent ||= "\u2715 error";
+      this.part?.follow();
+    }
+    this.select(errors[0] ?? this.worstRow());
   }
 
   addBodies() {
@@ -86,6 +93,22 @@ class Page {
     return Math.max(this.columns.pass.findIndex((pass) => pass >= 0), 0);
   }
 
+  // Where lines with errors move the tool: of each line the sample that is farthest beyond a joint limit, else that nearest to a hit.
+  errorRows() {
+    const { line, margin, clearance } = this.columns;
+    const lines = head.marked.filter(([number, severity]) => severity === "error" && this.firstOfLine.has(number));
+    return lines.slice(0, MOST_ERRORS).map(([number]) => {
+      const first = this.firstOfLine.get(number);
+      const lowest = (values) => {
+        let at = first;
+        for (let i = first; values && line[i] === number; i++) if (values[i] < values[at]) at = i;
+        return at;
+      };
+      const beyond = lowest(margin);
+      return margin?.[beyond] < 0 ? beyond : lowest(clearance);
+    });
+  }
+
   // Where the tool bends away or is loaded most; without either, where it first cuts.
   worstRow() {
     const values = this.columns.deflection ?? this.columns.force;
@@ -118,12 +141,13 @@ class Page {
     const { columns, row } = this;
     const parts = [`${columns.time[row].toFixed(2)} s`];
     if (columns.line[row] > 0) parts.push(`line ${columns.line[row]}`);
-    parts.push(["x", "y", "z"].map((axis) => `${axis.toUpperCase()} ${columns[axis][row].toFixed(2)}`).join(" "));
     const near = this.robot?.nearest(row);
+    if (near?.gap <= 0) parts.push(`${near.who} hits ${near.what}`);
+    parts.push(["x", "y", "z"].map((axis) => `${axis.toUpperCase()} ${columns[axis][row].toFixed(2)}`).join(" "));
     head.quantities.filter(({ name }) => name !== "clearance").forEach(({ name, label, unit }) => {
       parts.push(`${name === "margin" ? "margin" : label} ${rounded(columns[name][row])}${unit === "°" ? "" : " "}${unit}`);
     });
-    if (near) parts.push(near.gap <= 0 ? `${near.who} hits ${near.what}` : `${near.who} ${rounded(near.gap)} mm from ${near.what}`);
+    if (near?.gap > 0) parts.push(`${near.who} ${rounded(near.gap)} mm from ${near.what}`);
     if (this.robot && !this.robot.reached) parts.push("out of the robot's reach");
     return parts.join("  ·  ");
   }

@@ -104,7 +104,7 @@ class Part {
     robot.checked = false;
     if (page.robot) page.robot.wanted = false;
     robot.addEventListener("change", () => { isFirst = false; });
-    const follow = () => {
+    const follow = this.follow = () => {
       byId("show-finished").checked = false;
       if (isFirst && page.robot) robot.checked = page.robot.wanted = true;
       isFirst = false;
@@ -164,7 +164,8 @@ class Part {
     for (let cell = 0; cell < event.length; cell++) {
       const one = event[cell];
       let colour = CUT;
-      const isRaw = one < 0 || row[one] < 0;
+      const isLeft = quantity === "nominal" && one === lastOf[cell] && off[cell] !== 0;
+      const isRaw = (one < 0 || row[one] < 0) && !isLeft;
       if (isRaw) colour = UNCUT;
       else if (quantity === "tool") colour = tools[head.tools.indexOf(columns.tool[row[one]]) % tools.length];
       else if (scale) colour = palette[Math.round(255 * Math.max(shadeOf(scale, columns[quantity][row[one]]), 0))];
@@ -218,13 +219,15 @@ class Part {
   rowUnder(x, y) {
     const cell = this.mesh.visible ? this.shape.under(this.rayThrough(x, y)) : -1, event = cell < 0 ? -1 : this.event[cell];
     const note = byId("part-note"), isCut = event >= 0 && this.row[event] >= 0;
-    note.textContent = cell >= 0 && !isCut ? "not cut" : "";
+    const isLast = event === this.lastOf[cell], nominal = isLast ? this.cells.nominal?.[cell] : NaN;
+    const differs = cell >= 0 && Number.isFinite(nominal) ? `${signed(nominal)} mm to nominal` : "";
+    note.textContent = cell >= 0 && !isCut ? ["not cut", differs].filter(Boolean).join(" · ") : "";
     if (!isCut) return -1;
-    const isLast = event === this.lastOf[cell], row = isLast ? this.cells.left[cell] : this.row[event];
+    const row = isLast ? this.cells.left[cell] : this.row[event];
     const { columns } = this.page, words = [`line ${columns.line[row]}`, `${columns.time[row].toFixed(2)} s`];
     if (columns.force) words.push(`force ${rounded(columns.force[row])} N`);
     if (isLast && this.cells.error) words.push(`error ${signed(this.cells.error[cell])} mm`);
-    if (isLast && Number.isFinite(this.cells.nominal?.[cell])) words.push(`${signed(this.cells.nominal[cell])} mm to nominal`);
+    if (differs) words.push(differs);
     note.textContent = words.join(" · ");
     return row;
   }

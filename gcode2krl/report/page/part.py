@@ -94,19 +94,6 @@ def _surface(history: SurfaceHistory, rows: Ints) -> tuple[dict[str, Any], _Colu
     return head, events, {"cube": (history.site, 1.0)}
 
 
-def worst_of_cells(off_mm: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return in each of ``shape`` (r, c) cells that of the finer cells' values which is farthest from 0."""
-    places = [
-        (np.arange(count) + 0.5) / count * wanted for count, wanted in zip(off_mm.shape, shape, strict=True)
-    ]
-    row, column = np.meshgrid(*(place.astype(np.int64) for place in places), indexing="ij")
-    worst = np.zeros((2, *shape))
-    np.maximum.at(worst[0], (row, column), off_mm)
-    np.minimum.at(worst[1], (row, column), off_mm)
-    farthest: Floats = np.where(worst[0] >= -worst[1], worst[0], worst[1])
-    return farthest
-
-
 def _row(rows: Ints, sample: Ints) -> Ints:
     """Return the first of the page's rows that is not before a sample."""
     return np.minimum(np.searchsorted(rows, sample), len(rows) - 1)

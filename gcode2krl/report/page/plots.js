@@ -4,8 +4,8 @@ const NEAR_PX = 4;
 const PLOT_COLOURS = { speed: "#0072b2", force: "#b34700", deflection: "#00795a", margin: "#8a4b78", clearance: "#8c6d1f" };
 
 class Plots {
-  constructor(place, columns, onPick, onStretch) {
-    Object.assign(this, { place, columns, onPick, onStretch });
+  constructor(place, columns, errors, onPick, onStretch) {
+    Object.assign(this, { place, columns, errors, onPick, onStretch });
     this.time = columns.time;
     this.work = workSpeed(columns);
     this.range = [this.time[0], this.time[this.time.length - 1]];
@@ -41,7 +41,7 @@ class Plots {
       ],
       hooks: {
         setSelect: [(plot) => this.dragged(plot)],
-        draw: [(plot) => isClipped && markClipped(plot, this.top(quantity)), () => this.place1 !== undefined && this.mark(this.place1)],
+        draw: [(plot) => markErrors(plot, this.errors.map((row) => this.time[row])), (plot) => isClipped && markClipped(plot, this.top(quantity)), () => this.place1 !== undefined && this.mark(this.place1)],
       },
     }, [[], []], holder);
     u.over.addEventListener("mousedown", () => { this.active = u; });
@@ -127,6 +127,17 @@ class Plots {
 function workSpeed({ speed, pass }) {
   const highest = (isCounted) => speed.reduce((most, one, i) => (isCounted(i) && one > most ? one : most), 0);
   return highest((i) => pass[i] >= 0) || highest(() => true);
+}
+
+// A line through the plot at each time of an error.
+function markErrors(u, times) {
+  const pen = u.ctx, { min, max } = u.scales.x;
+  pen.save();
+  pen.fillStyle = "#c00000";
+  times.filter((time) => time >= min && time <= max).forEach((time) => {
+    pen.fillRect(u.valToPos(time, "x", true) - 0.5 * devicePixelRatio, u.bbox.top, devicePixelRatio, u.bbox.height);
+  });
+  pen.restore();
 }
 
 // A small triangle at the upper edge over each stretch that leaves the plot.

@@ -69,21 +69,36 @@ class Scene {
   }
 
   makeMarker() {
+    this.marker = this.sign("#d55e00", (pen) => pen.arc(32, 32, 22, 0, 2 * Math.PI));
+  }
+
+  // A cross at each row with an error.
+  markErrors(rows) {
+    rows.forEach((row) => {
+      const cross = this.sign("#c00000", (pen) => { for (const [x, y] of [[14, 14], [14, 50]]) { pen.moveTo(x, y); pen.lineTo(64 - x, 64 - y); } });
+      cross.position.fromArray(this.points, 3 * row);
+    });
+    this.changed(false);
+  }
+
+  // What is drawn on a square of 64 points and always seen, as large from near as from far.
+  sign(colour, draw) {
     const picture = document.createElement("canvas");
     picture.width = picture.height = 64;
     const pen = picture.getContext("2d");
-    for (const [width, colour] of [[14, "#ffffff"], [8, "#d55e00"]]) {
+    for (const [width, stroke] of [[14, "#ffffff"], [8, colour]]) {
       pen.lineWidth = width;
-      pen.strokeStyle = colour;
+      pen.strokeStyle = stroke;
       pen.beginPath();
-      pen.arc(32, 32, 22, 0, 2 * Math.PI);
+      draw(pen);
       pen.stroke();
     }
     const material = new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(picture), depthTest: false, sizeAttenuation: false });
-    this.marker = new THREE.Sprite(material);
-    this.marker.scale.setScalar(0.035);
-    this.marker.renderOrder = 10;
-    this.scene.add(this.marker);
+    const sprite = new THREE.Sprite(material);
+    sprite.scale.setScalar(0.035);
+    sprite.renderOrder = 10;
+    this.scene.add(sprite);
+    return sprite;
   }
 
   // shades: (rows,) 0 to 1 or one of RAPID, PALE, NONE; palette: colours of the scale.

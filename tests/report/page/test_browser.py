@@ -316,6 +316,7 @@ def test_gouges_and_rest_are_drawn_where_they_are(browser, prediction, tmp_path)
     nominal = {
         "volume_mm3": {"gouge": 5.0, "rest": 5.0},
         "left_out": {"gouge": 0, "rest": 3},
+        "at_mm": None,
         "differences": found,
     }
     made = tmp_path / "nominal.html"

@@ -10,9 +10,9 @@ import pytest
 from gcode2krl import load_cell, predict
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting import remove
+from gcode2krl.errors import Issue
 from gcode2krl.report.page import content_of, page, write_page
-from gcode2krl.report.page.part import worst_of_cells
-from gcode2krl.report.part_error import error_on, scale_end
+from gcode2krl.report.part_error import above_on, error_on, scale_end
 from gcode2krl.translation.page import part_of
 from tests.conftest import ROOT
 from tests.report.page.browser import opened_browser, opened_page
@@ -94,9 +94,20 @@ def test_the_error_of_a_compensated_program_is_not_that_of_its_deflection(predic
     assert error_on(history, replace(prediction, inputs={"compensate": "offline"})) is None
 
 
-def test_a_map_keeps_what_is_farthest_off():
+def test_a_map_keeps_what_is_farthest_off(history):
     off_mm = np.array([[0.1, -0.3, 0.0, 0.0], [0.0, 0.2, 0.0, 0.4]])
-    assert worst_of_cells(off_mm, (1, 2)).tolist() == [[-0.3, 0.4]]
+    two = history._replace(raw_mm=np.zeros((1, 2)))
+    assert above_on(two, off_mm, None).tolist() == [[-0.3, 0.4]]
+
+
+def test_a_map_of_a_surface_has_what_is_near_its_sites(five):
+    _, surface = five
+    points_mm, squares = surface.surface()
+    site = int(squares[0, 0])
+    at_mm = points_mm[site] + np.array([[0.0, 0.0, 0.01], [0.01, 0.0, 0.0]])
+    above_mm = above_on(surface, np.array([0.2, -0.5]), at_mm)
+    assert above_mm[site] == -0.5
+    assert np.count_nonzero(above_mm) == 1
 
 
 def test_a_scale_ends_at_a_round_number_beyond_nearly_all():
@@ -120,7 +131,7 @@ def window(content, browser, tmp_path_factory):
 
 @pytest.mark.browser
 def test_its_volume_is_that_of_the_machined_stock(window, prediction):
-    left = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False).part
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False).left
     window.evaluate(FINISHED, True)
     assert window.evaluate(VOLUME) == pytest.approx(left.volume_mm3, rel=0.005)
 
@@ -218,3 +229,21 @@ def test_under_a_turning_axis_a_click_says_which_line_left_the_surface(turned_wi
     turned_window.locator("#section-axis").select_option("")
     turned_window.mouse.click(*turned_window.evaluate(PLACE, [50.0, 40.0, 0.0]))
     assert turned_window.locator("#part-note").inner_text() == "not cut"
+
+
+@pytest.mark.browser
+def test_a_page_with_errors_begins_at_the_first_and_marks_all(five, browser, tmp_path):
+    prediction, part = five
+    lines = 15, 30
+    issues = [Issue("error", "joint-limit", line, "A5 beyond its limit", "move the part") for line in lines]
+    file = tmp_path / "errors.html"
+    write_page(content_of(prediction, verdict="refused", issues=issues, part=part), file)
+    window = opened_page(browser, file)
+    assert window.locator("h1").inner_text().endswith("A5 beyond its limit (line 15), and 1 more error")
+    rows = window.evaluate("report.plots.errors")
+    assert prediction.toolpath.source_line[prediction.motion.move[rows]].tolist() == list(lines)
+    assert window.evaluate("report.row") == rows[0]
+    assert not window.locator("#show-finished").is_checked()
+    assert window.locator("#show-robot").is_checked()
+    assert window.evaluate(VOLUME) == pytest.approx(part.volume_mm3(rows[0]), rel=1e-4)
+    assert window.said == []
