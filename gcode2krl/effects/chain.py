@@ -81,7 +81,7 @@ def forces(inputs: Inputs, applied: Sequence[Applied] = ()) -> Signals:
 
 def _nominal(inputs: Inputs) -> Signals:
     """Return the commanded motion as all signals, without forces."""
-    q_cmd, nothing = inputs.q_cmd_rad, np.zeros_like(inputs.position_mm)
+    q_cmd, nothing = inputs.q_cmd_rad, np.zeros(inputs.position_mm.shape)  # unwritten, it takes no memory
     return Signals(
         inputs=inputs,
         q_cmd_rad=q_cmd,

@@ -93,6 +93,18 @@ Sources = tuple[Any, ...]
 Made = TypeVar("Made")
 
 
+def of_the_path(make: "Callable[[Inputs], Made]") -> "cached_property[Made]":
+    """Return a property that follows from the commanded path and the cell alone, whatever the times on it.
+
+    Runs and links share its value: of a long run one of them is as large as all that was measured.
+    """
+
+    def once(inputs: "Inputs") -> Made:
+        return inputs.remembered(make.__name__, make, inputs.path)
+
+    return cached_property(wraps(make)(once))
+
+
 def of_the_command(make: "Callable[[Inputs], Made]") -> "cached_property[Made]":
     """Return a property that follows from commanded motion and cell alone: runs and links share its value."""
 
@@ -151,25 +163,25 @@ class Inputs:
         return len(self.time_s)
 
     @property
-    def commanded(self) -> Sources:
-        """What the commanded motion consists of, and the cell."""
-        return self.cell, self.time_s, self.q_cmd_rad, self.position_mm, self.rotation, self.tool
+    def path(self) -> Sources:
+        """What the commanded path consists of, and the cell."""
+        return self.cell, self.q_cmd_rad, self.position_mm, self.rotation, self.tool
 
-    def remembered(self, name: str, make: "Callable[[Inputs], Made]") -> Made:
-        """Return what follows from the commanded motion alone, made once for all inputs that share it."""
-        sources = self.commanded
+    def remembered(self, name: str, make: "Callable[[Inputs], Made]", sources: Sources = ()) -> Made:
+        """Return what follows from these sources, or from the commanded motion, made once for all inputs."""
+        sources = sources or (*self.path, self.time_s)
         known = self.kept.get(name)
         if known is None or any(old is not new for old, new in zip(known[0], sources, strict=True)):
             known = self.kept[name] = sources, make(self)
         made: Made = known[1]
         return made
 
-    @of_the_command
+    @of_the_path
     def tool_rotation(self) -> Floats:
         """(m, 3, 3) commanded rotations of the tool frame in ``$BASE``."""
         return fr.rotation_from_quaternion(self.rotation)
 
-    @of_the_command
+    @of_the_path
     def sensor_rotation(self) -> Floats:
         """(m, 3, 3) rotations of the force sensor in ``$BASE``; its axes are those of the flange."""
         turned = np.empty((len(self), 3, 3))
@@ -183,7 +195,7 @@ class Inputs:
         down: Floats = self.cell.base_in_world()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
         return down
 
-    @of_the_command
+    @of_the_path
     def jacobian(self) -> Floats:
         """(m, 6, 6) of the tip at the commanded joints, along ``$BASE``."""
         return arm.jacobian_base(self.q_cmd_rad, self.cell, self.tool)
@@ -206,12 +218,12 @@ class Inputs:
         """(m, 6) torque of weight and inertia of links and payload."""
         return torque_Nm(self.bodies, self.bodies_push_N, self.axes_mm, self.jacobian)
 
-    @of_the_command
+    @of_the_path
     def axes_mm(self) -> Floats:
         """(m, 6, 3) a point of each joint's axis in ``$BASE``: where the links meet."""
         return arm.axes_mm(self.q_cmd_rad, self.lengths_mm, self.cell)
 
-    @of_the_command
+    @of_the_path
     def bodies(self) -> Bodies:
         """Links and payload as points with a mass."""
         return bodies_of(self.cell, self.axes_mm, self.position_mm, self.tool_rotation, self.tool)
@@ -287,7 +299,7 @@ class Inputs:
         tip_mm = arm.tip_mm(q_rad, lengths_mm, self.cell, self.tool)
         return self.position_mm + (tip_mm - self._commanded_tip_mm)
 
-    @of_the_command
+    @of_the_path
     def _commanded_tip_mm(self) -> Floats:
         return arm.tip_mm(self.q_cmd_rad, self.lengths_mm, self.cell, self.tool)
 

@@ -15,6 +15,15 @@ def test_measured_values_keep_what_is_commanded():
     np.testing.assert_array_equal(later.own_torque_Nm, torque)
 
 
+def test_a_path_on_other_times_keeps_its_geometry_and_has_velocities_of_its_own():
+    inputs = replace(motion(), kept={})
+    jacobian, turned, velocity = inputs.jacobian, inputs.tool_rotation, inputs.velocity_mm_s
+    later = replace(inputs, time_s=2.0 * inputs.time_s)
+    assert later.jacobian is jacobian
+    assert later.tool_rotation is turned
+    np.testing.assert_allclose(later.velocity_mm_s, velocity / 2.0)
+
+
 def test_another_motion_has_values_of_its_own():
     inputs = motion()
     before = inputs.jacobian.copy()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcode2krl.effects import Applied, library
+from gcode2krl.gap.compare import pair
 from gcode2krl.gap.compare.pair import Simulator
 from tests.gap.constructed import Added, applied, motion
 
@@ -71,3 +72,18 @@ def test_the_oldest_are_forgotten_beyond_64():
 def test_two_simulators_share_nothing():
     path = [applied(Counted(), 0.1)]
     assert Simulator().commanded(motion(), path) is not Simulator().commanded(motion(), path)
+
+
+def test_of_long_runs_the_last_fine_path_alone_is_kept(monkeypatch):
+    simulator, made = Simulator(), []
+
+    def finer(inputs):
+        made.append(replace(inputs))
+        return made[-1]
+
+    monkeypatch.setattr(pair, "with_corners", finer)
+    for limit, kept in ((10**6, [0, 1]), (10, [2])):
+        monkeypatch.setattr(pair, "_LIMITS", replace(pair._LIMITS, remembered_rows=limit))
+        for later_s in (1.0, 2.0) if limit > 10 else (3.0,):
+            simulator.commanded(replace(motion(), time_s=motion().time_s + later_s), [])
+        assert list(simulator._fine.values()) == [made[number] for number in kept]

@@ -138,12 +138,14 @@ class Simulator:
         return self._kept[key]
 
     def _with_corners(self, inputs: Inputs) -> Inputs:
-        """Return the inputs sampled often enough for corners, made once."""
+        """Return the inputs sampled often enough for corners: of short runs all, of long ones the last."""
         digest = self._digests[inputs]
         if digest not in self._fine:
             fine = with_corners(inputs)
             if fine is inputs:
                 return inputs
+            if len(fine) > _LIMITS.remembered_rows:
+                self._fine.clear()
             self._fine[digest] = fine
         return self._fine[digest]
 

@@ -14,7 +14,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.gap.compare.links import FORCE, MECHANICS
 from gcode2krl.gap.compare.pair import Pair
-from gcode2krl.gap.compare.trace import Context, Trace, is_lost
+from gcode2krl.gap.compare.trace import Context, Trace, evenly_spread, is_lost
 from gcode2krl.gap.components import Signatures
 from gcode2krl.gap.noise.nuisance import Nuisance, nuisance_for
 from gcode2krl.gap.noise.source import noise_of
@@ -65,12 +65,18 @@ def bends_of(judged: Judgement, context: Context) -> list[Bend]:
         for in_air in (False, True)
     ]
     of_tip = MECHANICS.base(context)
-    traces = MECHANICS.traces(context.pairs, of_tip)
+    traces = evenly_spread(MECHANICS.traces(context.pairs, of_tip))
     if not traces or traces[0].still:
         return [Bend(each, 0.0, 0.0, np.inf) for each in bent]
     question = replace(question_of(MECHANICS, traces, context), blocks=())
     nuisance = nuisance_for(traces, question, Signatures())
-    return [Bend(each, *_followed(traces, MECHANICS.traces(each, of_tip), nuisance)) for each in bent]
+    return [Bend(each, *_followed(traces, _on(each, traces), nuisance)) for each in bent]
+
+
+def _on(pairs: Sequence[Pair], traces: Sequence[Trace]) -> list[Trace]:
+    """Return the traces of the tip, at the same rows, beside the models of other pairs."""
+    models = {trace.run_number: trace.inputs for trace in MECHANICS.traces(pairs)}
+    return [replace(trace, inputs=models[trace.run_number]) for trace in traces]
 
 
 def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Bend]) -> list[Trace] | None:

@@ -574,7 +574,8 @@ class LinkData:
         """Return the data without the columns of candidates, which only a selection needs."""
         self.known.forget()
         candidates = replace(self.candidates, signatures=())
-        return replace(self, candidates=candidates, signatures=SignatureGram.none())
+        likelihood = self.likelihood.put_away()
+        return replace(self, candidates=candidates, signatures=SignatureGram.none(), likelihood=likelihood)
 
     @property
     def values(self) -> int:

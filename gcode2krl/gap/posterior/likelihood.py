@@ -232,18 +232,27 @@ class Likelihood:
         self.design = NuisanceDesign.of(nuisance)
         self._sure = [_sure(trace, own, self.noise) for trace, own in zip(self.traces, nuisance, strict=True)]
         """(k, n) of each trace"""
-        self.whitened_nuisance = [
+        self.once = CountedOnce(self.design)
+        self._normal = np.eye(self.design.width)
+        for used in (each for own in self.whitened_nuisance for each in own):
+            self._normal[np.ix_(used.at, used.at)] += used.values.T @ used.values
+
+    @cached_property
+    def whitened_nuisance(self) -> list[list[UsedColumns]]:
+        """Of each trace and component."""
+        return [
             [
                 self._used(number, j, columns, self.design.places[number])
                 for j, columns in enumerate(self.design.columns(number, trace))
             ]
             for number, trace in enumerate(self.traces)
         ]
-        """Of each trace and component."""
-        self.once = CountedOnce(self.design)
-        self._normal = np.eye(self.design.width)
-        for used in (each for own in self.whitened_nuisance for each in own):
-            self._normal[np.ix_(used.at, used.at)] += used.values.T @ used.values
+
+    def put_away(self) -> "Likelihood":
+        """Return the likelihood of a link that is judged: its large columns are made again if asked for."""
+        other = copy(self)
+        del other.whitened_nuisance
+        return other
 
     def counting(self, once: CountedOnce) -> "Likelihood":
         """Return the likelihood in which more nuisance gives way to effects of the same form."""
