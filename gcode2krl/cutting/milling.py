@@ -68,16 +68,21 @@ def shaped(position_mm: Floats, direction: Floats, path_mm: Floats, joined: Bool
     joined : (m,) True where a sweep leads from the sample before.
     """
     count = len(position_mm)
-    cosine = (direction[1:] * direction[:-1]).sum(axis=1)
-    moves = np.abs(direction).max(axis=1, initial=0.0) > 0.0
+    x, y, z = (direction[1:] * direction[:-1]).T
+    cosine = x + y + z
+    moves = (direction[:, 0] != 0.0) | (direction[:, 1] != 0.0) | (direction[:, 2] != 0.0)
     turns = (cosine < math.cos(LEAST_TURN_RAD)) & moves[1:] & moves[:-1] & joined[1:]
     after = np.flatnonzero(turns) + 1
     way_mm = np.diff(path_mm)[after - 1]
     between, owner = _between(position_mm, direction, after, way_mm, cosine[after - 1])
-    sample = np.concatenate([np.arange(count), owner])
-    order = np.lexsort((np.arange(len(sample)) < count, sample))  # a sample comes after the points before it
-    every = np.concatenate([position_mm, between])[order]
-    return Shaped(every, sample[order], order < count)
+    every = np.empty((count + len(owner), 3))
+    sample, read = np.empty(len(every), dtype=np.int64), np.zeros(len(every), dtype=np.bool_)
+    # a sample comes after the points before it
+    at = np.arange(count) + np.cumsum(np.bincount(owner, minlength=count))
+    read[at] = True
+    every[at], sample[at] = position_mm, np.arange(count)
+    every[~read], sample[~read] = between, owner
+    return Shaped(every, sample, read)
 
 
 def _between(

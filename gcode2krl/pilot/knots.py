@@ -148,7 +148,10 @@ def force_at(knots: Knots, time_s: Floats) -> Floats:
     """Return the pilot force (n, 3) in N at times (n,): linear in time between knots, zero outside."""
     if len(knots) == 0:
         return np.zeros((len(time_s), 3))
-    force = np.stack([np.interp(time_s, knots.time_s, column) for column in knots.force_N.T], axis=1)
+    first, last = np.searchsorted(knots.time_s, [time_s.min(initial=np.inf), time_s.max(initial=-np.inf)])
+    near = slice(max(first - 1, 0), last + 1)  # of all knots, those beside the times
+    columns = knots.force_N[near].T
+    force = np.stack([np.interp(time_s, knots.time_s[near], column) for column in columns], axis=1)
     written_s = 0.5 * 10.0**-TIME_DECIMALS
     force[(time_s < knots.time_s[0] - written_s) | (time_s > knots.time_s[-1] + written_s)] = 0.0
     return force
@@ -162,7 +165,10 @@ def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints32, cell: Ce
     """
     if cell.pilot.frame == "base":
         return vector_base
-    first, run = fr.equal_runs(np.column_stack([rotation, tool]))
+    if fr.all_alike(rotation) and fr.all_alike(tool):
+        first, run = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    else:
+        first, run = fr.equal_runs(np.column_stack([rotation, tool]))
     turned = fr.rotation_from_quaternion(rotation[first])
     for number in np.unique(tool[first]).tolist():
         turned[tool[first] == number] @= controller_axes(cell.tool[number].axis or "+z")[:3, :3].T
