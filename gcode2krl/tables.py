@@ -134,12 +134,14 @@ def joined(first: AnyTable, *others: AnyTable) -> AnyTable:
         return tables[0] if tables else first
     columns: dict[str, Any] = {}
     for spec in columns_of(type(first)):
-        columns[spec.name] = _concatenated([getattr(table, spec.name) for table in tables])
+        columns[spec.name] = joined_columns([getattr(table, spec.name) for table in tables])
     return replace(first, **columns)
 
 
-def _concatenated(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def joined_columns(parts: list[NDArray[Any]]) -> NDArray[Any]:
     """Return columns joined; what is one row throughout stays one row in memory."""
+    if len(parts) == 1:
+        return parts[0]
     row = parts[0][:1]
     if all(part.strides[0] == 0 and np.array_equal(part[:1], row) for part in parts):
         return np.broadcast_to(row[0], (sum(map(len, parts)), *row.shape[1:]))

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.tables import Toolpath
 
 FLAT_MM = 1e-6
@@ -153,7 +154,7 @@ class _Cuts:
             for share in (_MOST, 0.5)
         )
         level = cuts & (np.abs(feed.rise_mm) <= FLAT_MM) & (middle <= most + FLAT_MM)
-        return cls(most, half, np.unique(middle[level]))
+        return cls(most, half, distinct(middle[level]))
 
     def first_pass_mm(self, radius_mm: float) -> float:
         """Return how deep the first pass may be; infinite if there are only holes."""

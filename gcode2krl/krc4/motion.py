@@ -11,6 +11,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.carriers import most_of
 from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
@@ -376,7 +377,7 @@ def _scales(
     scale[rows + 1] = ratio
     ends = np.append(np.flatnonzero(stop), len(length) - 1)
     chain_end = ends[np.searchsorted(ends, rows + 1)]
-    for last in np.unique(chain_end):
+    for last in distinct(chain_end):
         moves = slice(rows[chain_end == last][0] + 1, last + 1)
         scale[moves] = np.cumprod(scale[moves])
     blend[:-1] /= scale[:-1]

@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunked
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import halts_advance, read_order
@@ -179,7 +180,7 @@ def _arcs_behind(chain: Chain, head_mm: Floats, tail_mm: Floats, rows: slice) ->
 def _halts(targets: Targets, cell: Cell) -> Rows:
     """Return the rows of Targets behind which the advance run waits: dwells, and events that say so."""
     rows = {event.row for event in targets.events if halts_advance(event_statements(event, cell).split("\n"))}
-    return np.union1d(np.flatnonzero(targets.wait_s > 0), np.array(sorted(rows), dtype=np.int64))
+    return distinct(np.append(np.flatnonzero(targets.wait_s > 0), np.array(sorted(rows), dtype=np.int64)))
 
 
 def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats) -> Floats:
@@ -191,7 +192,7 @@ def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats)
     unknown[:-2] |= targets.ptp[1:]
     if count == 0:
         return np.zeros(1)
-    vertex = np.union1d(np.flatnonzero(unknown[chain.first : chain.first + count]), [0])
+    vertex = distinct(np.append(0, np.flatnonzero(unknown[chain.first : chain.first + count])))
     return clock.departure(leave_mm[vertex], np.ones(len(vertex), dtype=np.bool_))
 
 

@@ -15,6 +15,7 @@ from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import FLOAT, FLOATS, INTS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.exchange import Table, column
 
@@ -170,7 +171,7 @@ def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints32, cell: Ce
     else:
         first, run = fr.equal_runs(np.column_stack([rotation, tool]))
     turned = fr.rotation_from_quaternion(rotation[first])
-    for number in np.unique(tool[first]).tolist():
+    for number in distinct(tool[first]).tolist():
         turned[tool[first] == number] @= controller_axes(cell.tool[number].axis or "+z")[:3, :3].T
     if len(first) == 1 and (turned == np.eye(3)).all():
         return vector_base
@@ -205,10 +206,12 @@ def _always_kept(time_s: Floats, acting: Bools, breaks: Rows, least_s: float) ->
     kept = np.zeros(len(time_s), dtype=np.bool_)
     change = np.flatnonzero(acting[1:] != acting[:-1])
     ends = [row for row in (0, len(acting) - 1) if len(acting) and acting[row]]
-    contacts = np.union1d(change + ~acting[change + 1], ends).astype(np.int64)  # the sample without force
+    contacts = distinct(
+        np.append(change + ~acting[change + 1], ends).astype(np.int64)
+    )  # the sample without force
     kept[contacts[_spaced(time_s[contacts], least_s)]] = True
     contacts = np.flatnonzero(kept)
-    inner = np.unique(breaks[acting[breaks]])
+    inner = distinct(breaks[acting[breaks]])
     if len(contacts) and len(inner):
         behind = np.searchsorted(contacts, inner)
         after_s = time_s[contacts[np.minimum(behind, len(contacts) - 1)]] - time_s[inner]
