@@ -481,15 +481,14 @@ class Milling:
     def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:
         found, checks = engaged.result, self._checks
         # a rapid through material is reported as a collision, and is not a cut
-        force_N, moment_Nmm = (
-            np.where(rows.rapid[:, None], 0.0, each) for each in (found.force_N, found.moment_Nmm)
-        )
-        mean_N = lengths(force_N)
+        for column in (found.force_N, found.moment_Nmm, found.torque_Nmm):
+            column[rows.rapid] = 0.0
+        mean_N = lengths(found.force_N)
         forces = Forces(
-            force_base_N=turned(force_N, self._to_field.T),
-            moment_base_Nmm=turned(moment_Nmm, self._to_field.T),
+            force_base_N=turned(found.force_N, self._to_field.T),
+            moment_base_Nmm=turned(found.moment_Nmm, self._to_field.T),
             peak_N=mean_N if self._peaks is None else self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N),
-            torque_Nmm=np.where(rows.rapid, 0.0, found.torque_Nmm),
+            torque_Nmm=found.torque_Nmm,
             a_p_mm=found.a_p_mm,
             a_e_mm=found.a_e_mm,
             phi_rad=found.phi_rad,

@@ -211,8 +211,10 @@ class _Clock:
         def arrived(rows: slice) -> Floats:
             after = np.searchsorted(self.path_mm, path_mm[rows] - _AT_REST_MM, side="left")
             after = np.clip(after, 1, len(self.time_s) - 1)
-            stopping = np.minimum(self.time_s[after - 1] + self._from_rest(after - 1), self.time_s[after])
-            return np.where(at_rest[rows], stopping, self._between(path_mm[rows], after))
+            instants, stop = self._between(path_mm[rows], after), after[at_rest[rows]]
+            stopping = self.time_s[stop - 1] + self._from_rest(stop - 1)
+            instants[at_rest[rows]] = np.minimum(stopping, self.time_s[stop])
+            return instants
 
         return chunked(arrived, len(path_mm))
 
@@ -222,8 +224,10 @@ class _Clock:
         def left(rows: slice) -> Floats:
             after = np.searchsorted(self.path_mm, path_mm[rows] + _AT_REST_MM, side="right")
             after = np.clip(after, 1, len(self.time_s) - 1)
-            starting = np.maximum(self.time_s[after] - self._from_rest(after), self.time_s[after - 1])
-            return np.where(at_rest[rows], starting, self._between(path_mm[rows], after))
+            instants, start = self._between(path_mm[rows], after), after[at_rest[rows]]
+            starting = self.time_s[start] - self._from_rest(start)
+            instants[at_rest[rows]] = np.maximum(starting, self.time_s[start - 1])
+            return instants
 
         return chunked(left, len(path_mm))
 
