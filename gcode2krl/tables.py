@@ -68,13 +68,13 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 def rows_of(table: AnyTable, start: int, end: int) -> AnyTable:
     """Return rows of a table, which share its memory; findings and other fields stay."""
-    columns = {spec.name: getattr(table, spec.name)[start:end] for spec in columns_of(type(table))}
+    columns = {spec.name: getattr(table, spec.name)[start:end] for spec in columns_of(table)}
     return replace(table, **columns)
 
 
 def rows_at(table: AnyTable, rows: NDArray[np.int64]) -> AnyTable:
     """Return chosen rows of a table."""
-    columns = {spec.name: getattr(table, spec.name)[rows] for spec in columns_of(type(table))}
+    columns = {spec.name: getattr(table, spec.name)[rows] for spec in columns_of(table)}
     return replace(table, **columns)
 
 
@@ -100,7 +100,7 @@ class Gathered(Generic[AnyTable]):
     def take(self, block: AnyTable) -> None:
         """Take the rows that follow."""
         self._first = block if self._first is None else self._first
-        for spec in columns_of(type(block)):
+        for spec in columns_of(block):
             self._columns[spec.name] = self._with(getattr(block, spec.name), self._columns.get(spec.name))
         self._done += len(block)
 
@@ -133,7 +133,7 @@ def joined(first: AnyTable, *others: AnyTable) -> AnyTable:
     if len(tables) < 2:
         return tables[0] if tables else first
     columns: dict[str, Any] = {}
-    for spec in columns_of(type(first)):
+    for spec in columns_of(first):
         columns[spec.name] = joined_columns([getattr(table, spec.name) for table in tables])
     return replace(first, **columns)
 

@@ -29,9 +29,13 @@ def derived_column(dtype: DTypeLike, *tail: int, on_disk: str = "") -> Any:
     return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail, **names})
 
 
+def columns_of(table: Any) -> tuple[Field[Any], ...]:
+    """Return the fields of a table that are columns."""
+    return _columns_of(type(table))
+
+
 @cache
-def columns_of(kind: type[Any]) -> tuple[Field[Any], ...]:
-    """Return the fields of a kind of table that are columns."""
+def _columns_of(kind: Any) -> tuple[Field[Any], ...]:
     return tuple(spec for spec in fields(kind) if "tail" in spec.metadata)
 
 
@@ -43,7 +47,7 @@ class Table(Frame):
 
     def __post_init__(self) -> None:
         rows = -1
-        for spec in columns_of(type(self)):
+        for spec in columns_of(self):
             values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"])
             rows = len(values) if rows < 0 else rows
             wanted = (rows, *spec.metadata["tail"])
@@ -57,7 +61,7 @@ class Table(Frame):
             object.__setattr__(self, spec.name, locked(values))
 
     def __len__(self) -> int:
-        return len(getattr(self, columns_of(type(self))[0].name))
+        return len(getattr(self, columns_of(self)[0].name))
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns by name, vectors split as in the files: ``position_x_mm`` ….
