@@ -31,7 +31,8 @@ def derived_column(dtype: DTypeLike, *tail: int, on_disk: str = "") -> Any:
 
 def columns_of(table: Any) -> tuple[Field[Any], ...]:
     """Return the fields of a table that are columns."""
-    return _columns_of(type(table))
+    kind: Any = type(table)  # to the checker of types no class of tables is hashable
+    return _columns_of(kind)
 
 
 @cache
