@@ -4,8 +4,10 @@ Conventions: active rotations, column vectors; quaternions are (x, y, z, w); A, 
 R = Rz(A)·Ry(B)·Rx(C).
 """
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gcode2krl.arrays import Floats, Ints
 
@@ -121,6 +123,11 @@ def slerp(a: Floats, b: Floats, part: Floats) -> Floats:
     mixed = wa[:, None] * a + wb[:, None] * b
     result: Floats = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
     return result
+
+
+def all_alike(values: NDArray[Any]) -> bool:
+    """Tell whether all rows (n, ...), at least one, are equal; at once where one stands for all in memory."""
+    return values.strides[0] == 0 or bool((values == values[0]).all())
 
 
 def equal_runs(values: Floats) -> tuple[Ints, Ints]:

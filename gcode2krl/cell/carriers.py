@@ -76,6 +76,8 @@ def base_in_world(
     external: External, at: Floats, base: Floats, base_on: ExternalName | None = None
 ) -> Floats:
     """Return ``$BASE`` in ``$WORLD`` (n, 4, 4) with E1 to E6 at (n, 6); ``base`` on its table."""
+    if not external:
+        return np.broadcast_to(base + 0.0, (len(at), 4, 4))
     frame = np.broadcast_to(np.eye(4), (len(at), 4, 4))
     for name in tables_of(external, base_on):
         axis = external[name]

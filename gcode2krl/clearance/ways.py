@@ -14,6 +14,7 @@ from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import checks_collisions
 from gcode2krl.clearance.proposals import ptp_way
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.tables import Targets
 
 BEHIND_ALL = int(np.iinfo(np.int32).max)
@@ -90,7 +91,7 @@ def moves_watched_at_targets(targets: Targets) -> Ints32:
     programmed = np.flatnonzero(targets.move >= 0)
     inside = np.zeros(len(targets), dtype=np.bool_)
     inside[programmed[0] + 1 : programmed[-1] + 1] = True
-    return np.unique(_owners(targets.move)[targets.ptp & inside])
+    return distinct(_owners(targets.move)[targets.ptp & inside])
 
 
 def _owners(move: Ints32) -> Ints32:

@@ -8,6 +8,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import collision_scope
 from gcode2krl.chain import Plan
 from gcode2krl.cli.loads import load_lines
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.krl import WrittenProgram
 from gcode2krl.krl.external_words import axes_words
 from gcode2krl.pose.chatter import chatter_not_judged
@@ -32,7 +33,7 @@ def summary_lines(
     away = ~targets.home
     lines = _span(targets.source_line[targets.source_line > 0], 0)
     x, y, z = (_span(targets.position_mm[lin, k], 2) for k in range(3))
-    tools = [f"T{n} {cell.tool[n].model}".rstrip() for n in np.unique(targets.tool[lin]).tolist()]
+    tools = [f"T{n} {cell.tool[n].model}".rstrip() for n in distinct(targets.tool[lin]).tolist()]
     wrist_deg = np.degrees(np.abs(joints.q_rad[away, 4]).min())
     limit_deg = joints.limit_margin_rad[away].min() * DEG_PER_RAD
     read_back = f"{report.max_deviation_mm:.4f} mm, {report.max_rotation_deg:.4f} deg"
@@ -56,7 +57,7 @@ def summary_lines(
     yield from load_lines(forecast.loads, cell)
     known = quantities(forecast.loads, forecast.time_s, targets, cell)
     yield from (f"  band       {words}" for words in band_words(known))
-    yield from _collisions(cell, np.unique(targets.tool).tolist(), is_cut=forecast.has_forces)
+    yield from _collisions(cell, distinct(targets.tool).tolist(), is_cut=forecast.has_forces)
 
 
 def _collisions(cell: Cell, tools: list[int], *, is_cut: bool) -> Iterator[str]:

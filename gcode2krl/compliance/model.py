@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compliance.estimate import ARM, Estimate, estimated
 from gcode2krl.errors import Issue, NotUnderstoodError, Severity, input_error
 
@@ -143,7 +144,8 @@ def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
     if np.ndim(tool) == 0:  # a cycle of the online side has no time to sort
         numbers, index = np.array([tool]), np.array(0)
     else:
-        numbers, index = np.unique(np.asarray(tool), return_inverse=True)
+        numbers = distinct(np.ravel(tool))
+        index = np.searchsorted(numbers, tool) if len(numbers) > 1 else np.array(0)
     for number in numbers:
         if int(number) not in cell.tool:
             known = ", ".join(str(name) for name in sorted(cell.tool)) or "none"
@@ -154,7 +156,7 @@ def tips(cell: Cell, tool: npt.ArrayLike | None, count: int) -> Tips:
         raise ValueError(f"tool has shape {np.shape(tool)}, not () or ({count},)")
     holder_mm = np.array([0.0, 0.0, _height_mm(cell)])
     position = np.array([cell.tool_matrix(int(number))[:3, 3] - holder_mm for number in numbers])
-    rows = np.broadcast_to(index.reshape(np.shape(tool)), count)
+    rows = np.broadcast_to(index, count)
     return Tips(position.reshape(-1, 3), np.ascontiguousarray(rows, dtype=np.int32))
 
 

@@ -263,8 +263,9 @@ def _bounds(along_mm: Floats, halo_mm: float, threads: int | None) -> list[float
     strips = min(threads or cores(), max(1, int(np.ptp(along_mm) / halo_mm)))
     if threads is None and len(along_mm) < _FEW_SAMPLES:
         strips = 1
-    inner = np.quantile(along_mm, np.linspace(0.0, 1.0, strips + 1)[1:-1])
-    return [-math.inf, *(float(border) for border in inner), math.inf]
+    shares = np.linspace(0.0, 1.0, strips + 1)[1:-1]
+    inner = np.quantile(along_mm, shares).tolist() if len(shares) else []
+    return [-math.inf, *inner, math.inf]
 
 
 def outlines_of(tools: Sequence[Tool]) -> Floats:

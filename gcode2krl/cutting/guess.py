@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.tables import Toolpath
 
 FLAT_MM = 1e-6
@@ -69,8 +70,9 @@ def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_
     if not len(feed.end_mm):
         start = position[known][:1] if known.any() else np.zeros((1, 3))
         return np.array([start[0] - radius_mm, start[0] + [radius_mm, radius_mm, 0.0]])
-    points = np.concatenate([feed.start_mm, feed.end_mm])
-    low, high = points[:, :2].min(axis=0) - radius_mm, points[:, :2].max(axis=0) + radius_mm
+    start, end = feed.start_mm[:, :2], feed.end_mm[:, :2]
+    low = np.minimum(start.min(axis=0), end.min(axis=0)) - radius_mm
+    high = np.maximum(start.max(axis=0), end.max(axis=0)) + radius_mm
     bottom = float(feed.end_mm[:, 2].min())
     deepest_mm = (
         deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf
@@ -94,11 +96,12 @@ def _feed_moves(toolpath: Toolpath, position: Floats, known: Bools) -> _Feed:
 def _level_rapids(toolpath: Toolpath, position: Floats) -> Floats:
     """Return the heights of the rapids that stay at their height; X and Y need not be known."""
     known = toolpath.known[:, 2]
-    rise = np.diff(position[:, 2], prepend=position[:1, 2])
-    across = np.linalg.norm(np.diff(position[:, :2], axis=0, prepend=position[:1, :2]), axis=1)
-    level = known & toolpath.rapid & ~toolpath.machine & (np.abs(rise) <= FLAT_MM) & (across > FLAT_MM)
-    level[1:] &= known[:-1]
-    return np.asarray(position[level, 2])
+    rapid = known & toolpath.rapid & ~toolpath.machine
+    rapid[1:] &= known[:-1]
+    rows = np.flatnonzero(rapid[1:]) + 1
+    step = position[rows] - position[rows - 1]
+    level = (np.abs(step[:, 2]) <= FLAT_MM) & (np.linalg.norm(step[:, :2], axis=1) > FLAT_MM)
+    return np.asarray(position[rows[level], 2])
 
 
 def _top(feed: _Feed, rapids: Floats, highest_mm: float, radius_mm: float, deepest_mm: float) -> float:
@@ -151,7 +154,7 @@ class _Cuts:
             for share in (_MOST, 0.5)
         )
         level = cuts & (np.abs(feed.rise_mm) <= FLAT_MM) & (middle <= most + FLAT_MM)
-        return cls(most, half, np.unique(middle[level]))
+        return cls(most, half, distinct(middle[level]))
 
     def first_pass_mm(self, radius_mm: float) -> float:
         """Return how deep the first pass may be; infinite if there are only holes."""

@@ -68,16 +68,21 @@ def shaped(position_mm: Floats, direction: Floats, path_mm: Floats, joined: Bool
     joined : (m,) True where a sweep leads from the sample before.
     """
     count = len(position_mm)
-    cosine = (direction[1:] * direction[:-1]).sum(axis=1)
-    moves = np.abs(direction).max(axis=1, initial=0.0) > 0.0
+    x, y, z = (direction[1:] * direction[:-1]).T
+    cosine = x + y + z
+    moves = (direction[:, 0] != 0.0) | (direction[:, 1] != 0.0) | (direction[:, 2] != 0.0)
     turns = (cosine < math.cos(LEAST_TURN_RAD)) & moves[1:] & moves[:-1] & joined[1:]
     after = np.flatnonzero(turns) + 1
     way_mm = np.diff(path_mm)[after - 1]
     between, owner = _between(position_mm, direction, after, way_mm, cosine[after - 1])
-    sample = np.concatenate([np.arange(count), owner])
-    order = np.lexsort((np.arange(len(sample)) < count, sample))  # a sample comes after the points before it
-    every = np.concatenate([position_mm, between])[order]
-    return Shaped(every, sample[order], order < count)
+    every = np.empty((count + len(owner), 3))
+    sample, read = np.empty(len(every), dtype=np.int64), np.zeros(len(every), dtype=np.bool_)
+    # a sample comes after the points before it
+    at = np.arange(count) + np.cumsum(np.bincount(owner, minlength=count))
+    read[at] = True
+    every[at], sample[at] = position_mm, np.arange(count)
+    every[~read], sample[~read] = between, owner
+    return Shaped(every, sample, read)
 
 
 def _between(
@@ -471,15 +476,14 @@ class Milling:
     def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:
         found, checks = engaged.result, self._checks
         # a rapid through material is reported as a collision, and is not a cut
-        force_N, moment_Nmm = (
-            np.where(rows.rapid[:, None], 0.0, each) for each in (found.force_N, found.moment_Nmm)
-        )
-        mean_N = lengths(force_N)
+        for column in (found.force_N, found.moment_Nmm, found.torque_Nmm):
+            column[rows.rapid] = 0.0
+        mean_N = lengths(found.force_N)
         forces = Forces(
-            force_base_N=turned(force_N, self._to_field.T),
-            moment_base_Nmm=turned(moment_Nmm, self._to_field.T),
+            force_base_N=turned(found.force_N, self._to_field.T),
+            moment_base_Nmm=turned(found.moment_Nmm, self._to_field.T),
             peak_N=mean_N if self._peaks is None else self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N),
-            torque_Nmm=np.where(rows.rapid, 0.0, found.torque_Nmm),
+            torque_Nmm=found.torque_Nmm,
             a_p_mm=found.a_p_mm,
             a_e_mm=found.a_e_mm,
             phi_rad=found.phi_rad,

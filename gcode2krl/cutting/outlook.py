@@ -7,6 +7,7 @@ import numpy as np
 
 from gcode2krl import frames as fr
 from gcode2krl.arrays import Floats
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.cutting.dexels import Dexels
 from gcode2krl.tables import Motion
 
@@ -55,8 +56,9 @@ class Watch:
             self._to_field = to_axis(self._axis)
         self._turns |= _leaves(motion.rotation, self._axis)
         height_mm = turned(motion.position_mm, self._to_field)[:, 2]
-        for number in np.unique(motion.tool[np.append(0, np.flatnonzero(np.diff(motion.tool)) + 1)]).tolist():
-            lowest_mm = float(height_mm[motion.tool == number].min())
+        numbers = distinct(motion.tool)
+        for number in numbers.tolist():
+            lowest_mm = float((height_mm[motion.tool == number] if len(numbers) > 1 else height_mm).min())
             self._lowest_mm[number] = min(self._lowest_mm.get(number, np.inf), lowest_mm)
         self._places_mm.append(turned(motion.position_mm[::_EVERY], self._to_field))
 

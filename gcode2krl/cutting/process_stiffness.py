@@ -17,6 +17,7 @@ import numpy as np
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.cutting.law import KIENZLE, feed_per_tooth, law_array
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.tables import Forces, Motion, Toolpath
@@ -36,7 +37,7 @@ def stiffness_of_cut(forces: Forces, motion: Motion, toolpath: Toolpath, cell: C
     law = law_array(cell.material) if cell.material is not None else np.zeros(8)
     result = np.zeros((len(forces), 3, 3))
     cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0)
-    for number in np.unique(forces.tool[cuts]):
+    for number in distinct(forces.tool[cuts]):
         rows = np.flatnonzero(cuts & (forces.tool == number))
         tool, move = cell.tool[int(number)], motion.move[rows]
         depth_mm = forces.a_p_mm[rows]

@@ -1,6 +1,7 @@
 """The base of all tables: columns with a declared type and shape, checked once, read-only from then on."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,17 @@ def derived_column(dtype: DTypeLike, *tail: int, on_disk: str = "") -> Any:
     return field(default=None, metadata={"dtype": np.dtype(dtype), "tail": tail, **names})
 
 
+def columns_of(table: Any) -> tuple[Field[Any], ...]:
+    """Return the fields of a table that are columns."""
+    kind: Any = type(table)  # to the checker of types no class of tables is hashable
+    return _columns_of(kind)
+
+
+@cache
+def _columns_of(kind: Any) -> tuple[Field[Any], ...]:
+    return tuple(spec for spec in fields(kind) if "tail" in spec.metadata)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Table(Frame):
     """A frozen dataclass of numpy columns, rows first, which other libraries take as a frame."""
@@ -36,9 +48,7 @@ class Table(Frame):
 
     def __post_init__(self) -> None:
         rows = -1
-        for spec in fields(self):
-            if "tail" not in spec.metadata:
-                continue
+        for spec in columns_of(self):
             values = np.asarray(getattr(self, spec.name), dtype=spec.metadata["dtype"])
             rows = len(values) if rows < 0 else rows
             wanted = (rows, *spec.metadata["tail"])
@@ -52,10 +62,7 @@ class Table(Frame):
             object.__setattr__(self, spec.name, locked(values))
 
     def __len__(self) -> int:
-        for spec in fields(self):
-            if "tail" in spec.metadata:
-                return len(getattr(self, spec.name))
-        return 0
+        return len(getattr(self, columns_of(self)[0].name))
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns by name, vectors split as in the files: ``position_x_mm`` ….

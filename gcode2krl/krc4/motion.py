@@ -11,6 +11,7 @@ from gcode2krl.cell import Cell
 from gcode2krl.cell.carriers import most_of
 from gcode2krl.cell.tool_tips import external_starts, motion_starts
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.krc4.laws import parabola_distance
 from gcode2krl.krc4.profile import UNLIMITED, Profile, plan_profile
@@ -176,8 +177,18 @@ def _sizes(start: Floats, end: Floats) -> Floats:
     return size
 
 
-def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Floats | None = None) -> Profile:
-    """Return the profile of a chain; ``look_ahead`` False leaves the model of ``$ADVANCE`` out."""
+def plan(
+    chain: Chain,
+    cell: Cell,
+    *,
+    look_ahead: bool = True,
+    pieces: bool = True,
+    speed_mm_s: Floats | None = None,
+) -> Profile:
+    """Return the profile of a chain; ``look_ahead`` False leaves the model of ``$ADVANCE`` out.
+
+    Without ``pieces`` it says no more than how long the motion lasts, in half the time.
+    """
     controller = cell.controller
     in_view = UNLIMITED if controller.advance == "unlimited" or not look_ahead else int(controller.advance)
     return plan_profile(
@@ -190,6 +201,7 @@ def plan(chain: Chain, cell: Cell, *, look_ahead: bool = True, speed_mm_s: Float
         controller.k_s,
         in_view,
         controller.law == "averages",
+        pieces=pieces,
     )
 
 
@@ -225,7 +237,8 @@ def motion_issues(
         law = cell.controller.law
         other_law = "trapezoid" if law == "averages" else "averages"
         other_controller = cell.controller.model_copy(update={"law": other_law})
-        other_s = plan(chain, cell.model_copy(update={"controller": other_controller})).total_s
+        by_other = cell.model_copy(update={"controller": other_controller})
+        other_s = plan(chain, by_other, pieces=False).total_s
         if abs(other_s - profile.total_s) > 0.05 * profile.total_s:
             sentence = f"time by law {law} {profile.total_s:.1f} s, by {other_law} {other_s:.1f} s"
             remedy = "`gcode2krl identify controller` writes the law of a trace into the cell"
@@ -364,7 +377,7 @@ def _scales(
     scale[rows + 1] = ratio
     ends = np.append(np.flatnonzero(stop), len(length) - 1)
     chain_end = ends[np.searchsorted(ends, rows + 1)]
-    for last in np.unique(chain_end):
+    for last in distinct(chain_end):
         moves = slice(rows[chain_end == last][0] + 1, last + 1)
         scale[moves] = np.cumprod(scale[moves])
     blend[:-1] /= scale[:-1]

@@ -55,6 +55,8 @@ def plan_profile(
     k_s: float,
     moves_in_view: int,
     averages: bool,
+    *,
+    pieces: bool = True,
 ) -> Profile:
     """Plan a chain of n moves that starts and ends at rest.
 
@@ -67,6 +69,7 @@ def plan_profile(
     a_mm_s2 : a number, or (n,) where the moves are scaled (see `Chain.scale`).
     moves_in_view : ``$ADVANCE``, or `UNLIMITED`.
     averages : the law; False = trapezoid.
+    pieces : False where only ``total_s`` is wanted: the columns are empty.
     """
     if len(length_mm) == 0:
         standstill = np.zeros(1)
@@ -83,14 +86,15 @@ def plan_profile(
     _margins(length, blend_mm[last], run_stop, vertex.copy(), k_s, vertex, head, tail, top)
     run_acceleration = acceleration[first]
     _reachable(length - head - tail, vertex, run_acceleration)
-    pieces, total_s = np.empty((5, 6 * len(length) + 2)), np.empty(1)
+    table, total_s = np.empty((5, 6 * len(length) + 2 if pieces else 0)), np.empty(1)
     used = _pieces(
         *(length, top, run_stop, wait_s[last], vertex, head, tail, run_acceleration, k_s, averages),
-        *(pieces, total_s),
+        *(table, total_s),
     )
-    t, s, v, a, i = (column[:used] for column in pieces)
-    move_end = np.empty(len(length_mm))
-    _move_ends(np.cumsum(length_mm), t, s, v, a, move_end)
+    t, s, v, a, i = (column[:used] for column in table)
+    move_end = np.empty(len(length_mm) if pieces else 0)
+    if pieces:
+        _move_ends(np.cumsum(length_mm), t, s, v, a, move_end)
     return Profile(t, s, v, a, i, move_end, float(total_s[0]))
 
 

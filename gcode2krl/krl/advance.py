@@ -7,6 +7,7 @@ import numpy as np
 from gcode2krl import krl_words as w
 from gcode2krl.arrays import Rows
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 
 
 def view(cell: Cell) -> int:
@@ -32,7 +33,7 @@ def read_order(motions: int, halts: Rows, cell: Cell) -> Rows:
     behind each motion in ``halts``: triggers before and behind it never wait at the same time.
     """
     after = np.zeros(motions + 1, dtype=np.int64)
-    after[np.unique(halts) + 1] = view(cell)
+    after[distinct(halts) + 1] = view(cell)
     return np.arange(motions + 1) + np.cumsum(after)
 
 

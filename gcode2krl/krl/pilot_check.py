@@ -11,6 +11,7 @@ from gcode2krl import krl_words as w
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunked
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import MOST_PLACES, Issue
 from gcode2krl.krl.advance import halts_advance, most_active, read_order, view
 from gcode2krl.krl.pilot_text import NO_KNOT_YET, PilotText, checksum
@@ -129,7 +130,7 @@ def _halts(program: KrlProgram) -> Ints:
     for statement in program.statements:
         texts.setdefault(statement.motion, []).append(statement.text)
     rows = [motion - 1 for motion, said in texts.items() if motion > 0 and halts_advance(said)]
-    return np.union1d(np.flatnonzero(program.wait_s > 0), np.array(rows, dtype=np.int64))
+    return distinct(np.append(np.flatnonzero(program.wait_s > 0), np.array(rows, dtype=np.int64)))
 
 
 def _ends_early(program: KrlProgram, pilot: PilotText) -> bool:

@@ -337,7 +337,8 @@ class _Reader:
             for size in distinct(places[:, 1]).tolist():
                 first = places[places[:, 1] == size, 0]
                 letters = data[first[:, None] + np.arange(size)]
-                names |= {row.tobytes().decode("ascii", "replace") for row in np.unique(letters, axis=0)}
+                written = distinct(letters.view(f"S{size}")[:, 0])
+                names |= {name.decode("ascii", "replace") for name in written.tolist()}
         return tuple(sorted({re.sub(r"\s+", "", name).upper() for name in names}))
 
     def _texts_of(self, block: StatementRun) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunked
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
 from gcode2krl.krl.advance import halts_advance, read_order
@@ -179,7 +180,7 @@ def _arcs_behind(chain: Chain, head_mm: Floats, tail_mm: Floats, rows: slice) ->
 def _halts(targets: Targets, cell: Cell) -> Rows:
     """Return the rows of Targets behind which the advance run waits: dwells, and events that say so."""
     rows = {event.row for event in targets.events if halts_advance(event_statements(event, cell).split("\n"))}
-    return np.union1d(np.flatnonzero(targets.wait_s > 0), np.array(sorted(rows), dtype=np.int64))
+    return distinct(np.append(np.flatnonzero(targets.wait_s > 0), np.array(sorted(rows), dtype=np.int64)))
 
 
 def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats) -> Floats:
@@ -191,7 +192,7 @@ def _sections(targets: Targets, chain: Chain, clock: "_Clock", leave_mm: Floats)
     unknown[:-2] |= targets.ptp[1:]
     if count == 0:
         return np.zeros(1)
-    vertex = np.union1d(np.flatnonzero(unknown[chain.first : chain.first + count]), [0])
+    vertex = distinct(np.append(0, np.flatnonzero(unknown[chain.first : chain.first + count])))
     return clock.departure(leave_mm[vertex], np.ones(len(vertex), dtype=np.bool_))
 
 
@@ -210,8 +211,10 @@ class _Clock:
         def arrived(rows: slice) -> Floats:
             after = np.searchsorted(self.path_mm, path_mm[rows] - _AT_REST_MM, side="left")
             after = np.clip(after, 1, len(self.time_s) - 1)
-            stopping = np.minimum(self.time_s[after - 1] + self._from_rest(after - 1), self.time_s[after])
-            return np.where(at_rest[rows], stopping, self._between(path_mm[rows], after))
+            instants, stop = self._between(path_mm[rows], after), after[at_rest[rows]]
+            stopping = self.time_s[stop - 1] + self._from_rest(stop - 1)
+            instants[at_rest[rows]] = np.minimum(stopping, self.time_s[stop])
+            return instants
 
         return chunked(arrived, len(path_mm))
 
@@ -221,8 +224,10 @@ class _Clock:
         def left(rows: slice) -> Floats:
             after = np.searchsorted(self.path_mm, path_mm[rows] + _AT_REST_MM, side="right")
             after = np.clip(after, 1, len(self.time_s) - 1)
-            starting = np.maximum(self.time_s[after] - self._from_rest(after), self.time_s[after - 1])
-            return np.where(at_rest[rows], starting, self._between(path_mm[rows], after))
+            instants, start = self._between(path_mm[rows], after), after[at_rest[rows]]
+            starting = self.time_s[start] - self._from_rest(start)
+            instants[at_rest[rows]] = np.maximum(starting, self.time_s[start - 1])
+            return instants
 
         return chunked(left, len(path_mm))
 

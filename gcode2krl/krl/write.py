@@ -12,6 +12,7 @@ from gcode2krl import robot
 from gcode2krl.cell import Cell
 from gcode2krl.cell.checked_parts import CollisionScope, collision_scope
 from gcode2krl.chain import forecast_of
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue, RefusedError, input_error
 from gcode2krl.exchange.findings import Findings, counted, findings_block
 from gcode2krl.exchange.html import beside, block, path_picture, text_table
@@ -281,7 +282,7 @@ def _scope(forecast: Forecast) -> CollisionScope | None:
     """Return what has been checked for collisions."""
     if not forecast.has_motion:
         return None
-    tools = [int(number) for number in np.unique(forecast.targets.tool)]
+    tools = [int(number) for number in distinct(forecast.targets.tool)]
     return collision_scope(forecast.cell, tools, is_cut=forecast.has_forces)
 
 

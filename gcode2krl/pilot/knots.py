@@ -15,6 +15,7 @@ from gcode2krl.arrays import Bools, Floats, Ints32, Rows
 from gcode2krl.cell import Cell, controller_axes
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import FLOAT, FLOATS, INTS, OUT_BOOLS, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.exchange import Table, column
 
@@ -148,7 +149,10 @@ def force_at(knots: Knots, time_s: Floats) -> Floats:
     """Return the pilot force (n, 3) in N at times (n,): linear in time between knots, zero outside."""
     if len(knots) == 0:
         return np.zeros((len(time_s), 3))
-    force = np.stack([np.interp(time_s, knots.time_s, column) for column in knots.force_N.T], axis=1)
+    first, last = np.searchsorted(knots.time_s, [time_s.min(initial=np.inf), time_s.max(initial=-np.inf)])
+    near = slice(max(first - 1, 0), last + 1)  # of all knots, those beside the times
+    columns = knots.force_N[near].T
+    force = np.stack([np.interp(time_s, knots.time_s[near], column) for column in columns], axis=1)
     written_s = 0.5 * 10.0**-TIME_DECIMALS
     force[(time_s < knots.time_s[0] - written_s) | (time_s > knots.time_s[-1] + written_s)] = 0.0
     return force
@@ -162,9 +166,12 @@ def to_pilot_frame(vector_base: Floats, rotation: Floats, tool: Ints32, cell: Ce
     """
     if cell.pilot.frame == "base":
         return vector_base
-    first, run = fr.equal_runs(np.column_stack([rotation, tool]))
+    if fr.all_alike(rotation) and fr.all_alike(tool):
+        first, run = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    else:
+        first, run = fr.equal_runs(np.column_stack([rotation, tool]))
     turned = fr.rotation_from_quaternion(rotation[first])
-    for number in np.unique(tool[first]).tolist():
+    for number in distinct(tool[first]).tolist():
         turned[tool[first] == number] @= controller_axes(cell.tool[number].axis or "+z")[:3, :3].T
     if len(first) == 1 and (turned == np.eye(3)).all():
         return vector_base
@@ -199,10 +206,12 @@ def _always_kept(time_s: Floats, acting: Bools, breaks: Rows, least_s: float) ->
     kept = np.zeros(len(time_s), dtype=np.bool_)
     change = np.flatnonzero(acting[1:] != acting[:-1])
     ends = [row for row in (0, len(acting) - 1) if len(acting) and acting[row]]
-    contacts = np.union1d(change + ~acting[change + 1], ends).astype(np.int64)  # the sample without force
+    contacts = distinct(
+        np.append(change + ~acting[change + 1], ends).astype(np.int64)
+    )  # the sample without force
     kept[contacts[_spaced(time_s[contacts], least_s)]] = True
     contacts = np.flatnonzero(kept)
-    inner = np.unique(breaks[acting[breaks]])
+    inner = distinct(breaks[acting[breaks]])
     if len(contacts) and len(inner):
         behind = np.searchsorted(contacts, inner)
         after_s = time_s[contacts[np.minimum(behind, len(contacts) - 1)]] - time_s[inner]

@@ -14,6 +14,7 @@ import numpy as np
 from gcode2krl import robot
 from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compliance import missing_stiffness, stiffness
 from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_stiffness
 from gcode2krl.cutting.force import cutting_load
@@ -71,7 +72,7 @@ def coupling_along(
     """
     cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0) & np.isfinite(q_rad).all(axis=1)
     rows = np.flatnonzero(cuts)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
+    rows = rows[distinct(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
     cut, moved, pose = rows_at(forces, rows), rows_at(motion, rows), q_rad[rows]
     process = stiffness_of_cut(cut, moved, toolpath, cell)
     turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)

@@ -12,6 +12,7 @@ from gcode2krl.arrays import Bools
 from gcode2krl.cell import Cell
 from gcode2krl.cell.layout import obstacle_box, stock_box
 from gcode2krl.cell.sections import Material, Tool
+from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Event, Toolpath
 from gcode2krl.units import MS_PER_S, RAD_PER_REV, S_PER_MIN
@@ -250,10 +251,11 @@ def feeds_per_tooth(toolpath: Toolpath, cell: Cell, cuts: Bools) -> Iterator[Iss
         & (toolpath.spindle_rad_s != 0.0)
         & (toolpath.feed_mm_s > 0.0)
     )
-    for number in np.unique(toolpath.tool[turning]).tolist():
+    x, y, z = (toolpath.position_mm[1:] != toolpath.position_mm[:-1]).T
+    turning[1:] &= x | y | z
+    for number in distinct(toolpath.tool[turning]).tolist():
         tool = cell.tool.get(number)
         rows = np.flatnonzero(turning & (toolpath.tool == number))
-        rows = rows[(toolpath.position_mm[rows] != toolpath.position_mm[rows - 1]).any(axis=1)]
         if tool is None or not len(rows):
             continue
         f_z_mm = RAD_PER_REV * toolpath.feed_mm_s[rows] / (np.abs(toolpath.spindle_rad_s[rows]) * tool.teeth)

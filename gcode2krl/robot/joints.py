@@ -24,7 +24,7 @@ from gcode2krl.robot.kinematics import status_turn
 from gcode2krl.robot.lines import Line, count_samples, path_of, sample_lines, samples_at
 from gcode2krl.robot.standing import Bits, limit_margin, what_is_wrong
 from gcode2krl.robot.velocity_kinematics import smallest_singular_value
-from gcode2krl.tables import Joints, Motion, Targets, blocks_of, joined, rows_at, rows_of
+from gcode2krl.tables import Joints, Motion, Targets, blocks_of, joined_columns, rows_at, rows_of
 
 _ANGLE_GRID_RAD = 1e-9
 _AGREEMENT_RAD = 1e-9
@@ -188,15 +188,17 @@ class Follower:
     def _angles(self, motion: Motion) -> Floats:
         """Return the angles (m, 6) of the next rows."""
         shared = int(self._before is not None)
-        whole = motion if self._before is None else joined(self._before, motion)
-        starts = np.zeros(len(whole), dtype=np.bool_)
+        position, rotation, tool, external = (
+            joined_columns([*(getattr(part, name) for part in (self._before, motion) if part is not None)])
+            for name in ("position_mm", "rotation", "tool", "external")
+        )
+        starts = np.zeros(len(position), dtype=np.bool_)
         starts[0] = not shared
         q = np.concatenate([self._q[-1:], np.empty((len(motion), 6))])
 
         def path(rows: slice) -> Path:
-            external = whole.external[rows]
-            poses = at_rest(whole.position_mm[rows], whole.rotation[rows], external, self._cell)
-            return Path(*poses, whole.tool[rows], starts[rows])
+            poses = at_rest(position[rows], rotation[rows], external[rows], self._cell)
+            return Path(*poses, tool[rows], starts[rows])
 
         def solve(start: int, end: int, before: Floats | None) -> Floats:
             first = max(start - 1, 0)

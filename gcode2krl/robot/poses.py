@@ -48,9 +48,9 @@ def flange_frames(position_mm: Floats, rotation: Floats, tool: Ints32, cell: Cel
     One tool in one orientation gives one rotation, (1, 3, 3).
     """
     base = cell.base_matrix()
-    constant = len(rotation) > 0 and bool((rotation == rotation[0]).all())
+    constant = len(rotation) > 0 and fr.all_alike(rotation)
     turned = base[:3, :3] @ fr.rotation_from_quaternion(rotation[:1] if constant else rotation)
-    if constant and (tool == tool[0]).all():
+    if constant and fr.all_alike(tool):
         tool_inverse = fr.invert(cell.tool_matrix(int(tool[0])))
         lever = base[:3, 3] + turned[0] @ tool_inverse[:3, 3]
         return position_mm @ base[:3, :3].T + lever, turned @ tool_inverse[:3, :3]

@@ -167,11 +167,13 @@ typedef struct {
 enum { TIME, PATH, SPEED, ACCELERATION, INTEGRAL };
 
 static void write_piece(Pieces *pieces, double speed, double acceleration) {
-    CELL(pieces->out, TIME, pieces->used) = pieces->t;
-    CELL(pieces->out, PATH, pieces->used) = pieces->s;
-    CELL(pieces->out, SPEED, pieces->used) = speed;
-    CELL(pieces->out, ACCELERATION, pieces->used) = acceleration;
-    CELL(pieces->out, INTEGRAL, pieces->used) = pieces->area;
+    if (pieces->out.columns > 0) {
+        CELL(pieces->out, TIME, pieces->used) = pieces->t;
+        CELL(pieces->out, PATH, pieces->used) = pieces->s;
+        CELL(pieces->out, SPEED, pieces->used) = speed;
+        CELL(pieces->out, ACCELERATION, pieces->used) = acceleration;
+        CELL(pieces->out, INTEGRAL, pieces->used) = pieces->area;
+    }
     pieces->speed = speed;
     pieces->acceleration = acceleration;
     pieces->used++;
@@ -199,8 +201,8 @@ static void rest(Pieces *pieces, double duration) {
     pieces->t += duration;
 }
 
-/* Write the pieces of all runs as rows time, path, speed, acceleration, integral, and the total time; return
-   how many pieces. */
+/* Write the pieces of all runs as rows time, path, speed, acceleration, integral, where there is room for any,
+   and the total time; return how many pieces. */
 EXPORT int64_t krc4_pieces(Floats length, Floats speed, Bools stop, Floats wait_s, Floats vertex, Floats head,
                            Floats tail, Floats a_mm_s2, double k_s, int64_t averages, Floats out,
                            Floats total_s) {
