@@ -16,6 +16,8 @@ a plane parts them from the body at both poses. */
 #define PARTED_MM 1e-5     /* a plane parts where it does so by no less than minus this */
 #define FINE 0.02          /* of a cell: where a swept surface may be beside the true one */
 #define PARALLEL 1e-6      /* cosine between ray and surface below which its slope says nothing of the step */
+#define ROOM 0.577          /* of how far rays are free along all three axes: where a plane that passes one of them may be */
+#define FREE_MM 1e3         /* as far as a ray without an end is free */
 #define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
 
 enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10 };
@@ -599,13 +601,14 @@ static int64_t cell_of(const Stock *stock, int axis, double at) {
 
 double depth_at(const Stock *stock, const double *place, double near_mm) {
     double best = 0.0, nearest_square = INFINITY, beyond = -INFINITY; /* of the box */
+    double free = FREE_MM;
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
         const double low = stock->low[axis], size = stock->cell[axis] * (double)stock->cells[axis];
         beyond = greater(beyond, greater(low - place[axis], place[axis] - low - size));
         if (beyond > near_mm)
-            return -near_mm;
+            return -beyond;
         cell[axis] = cell_of(stock, axis, place[axis]);
     }
     for (int axis = 0; axis < 3; axis++) {
@@ -621,6 +624,7 @@ double depth_at(const Stock *stock, const double *place, double near_mm) {
                 continue;
             double off[3], depth = 0.0;
             off[axis] = place[axis] - *end_at(stock, ray, end);
+            free = lesser(free, fabs(off[axis]));
             const int32_t facing = *facing_at(stock, ray, end);
             const double steep = fabs(unpacked(facing, axis));
             if (fabs(off[axis]) * steep > 1.5 * near_mm)
@@ -642,7 +646,7 @@ double depth_at(const Stock *stock, const double *place, double near_mm) {
         }
     }
     if (nearest_square == INFINITY)
-        best = inside >= 2 ? near_mm : -near_mm;
+        best = (inside >= 2 ? 1.0 : -1.0) * greater(ROOM * free, near_mm);
     return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
 
@@ -725,5 +729,5 @@ EXPORT void cutting_bodies_dexels(const Dexels *dexels, Floats ends_mm, Floats r
 EXPORT void cutting_depths(const Dexels *dexels, Floats places_mm, double near_mm, Floats depth_mm) {
     const Stock stock = stock_of(dexels);
     for (int64_t i = 0; i < places_mm.rows; i++)
-        AT(depth_mm, i) = depth_at(&stock, &CELL(places_mm, i, 0), near_mm);
+        AT(depth_mm, i) = clamped(depth_at(&stock, &CELL(places_mm, i, 0), near_mm), -near_mm, near_mm);
 }

@@ -84,7 +84,8 @@ double reach_of(const Body *body, const Pose *pose, const double *along);
    false where a ray has no room for another stretch: the step is then to be done again. */
 bool cut_out(const Stock *stock, const Body *body, const Step *step, double *removed_mm);
 
-/* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side. */
+/* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side, and so deep that the rays there
+   leave room for a ball of that radius. */
 double depth_at(const Stock *stock, const double *place, double near_mm);
 
 /* Return a height that no material within a radius in plan is above. */
