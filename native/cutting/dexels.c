@@ -40,16 +40,15 @@ typedef struct {
 
 Stock stock_of(const Dexels *dexels) {
     Stock stock = {.of = dexels};
-    int64_t rays = 0, blocks = 0;
+    int64_t blocks = 0;
     for (int axis = 0; axis < 3; axis++) {
         const int u = (axis + 1) % 3, v = (axis + 2) % 3;
         const int64_t columns = AT(dexels->cells, u), rows = AT(dexels->cells, v);
         const int64_t block_columns = (columns + SIDE - 1) / SIDE;
-        stock.fields[axis] = (Field){axis, u, v, columns, rows, rays, block_columns, blocks};
+        stock.fields[axis] = (Field){axis, u, v, columns, rows, block_columns, blocks};
         stock.low[axis] = AT(dexels->low_mm, axis);
         stock.cell[axis] = AT(dexels->cell_mm, axis);
         stock.cells[axis] = AT(dexels->cells, axis);
-        rays += columns * rows;
         blocks += block_columns * ((rows + SIDE - 1) / SIDE);
     }
     return stock;
@@ -266,10 +265,10 @@ static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double
 }
 
 /* Tell whether a ray has material between two places on it, in either order. */
-static bool has_between(const Cut *cut, int64_t ray, double a, double b) {
+static bool has_between(const Cut *cut, const Ray *ray, double a, double b) {
     const double low = lesser(a, b) - cut->fine_mm, high = greater(a, b) + cut->fine_mm;
-    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++)
-        if (*end_at(cut->stock, ray, 2 * k) < high && *end_at(cut->stock, ray, 2 * k + 1) > low)
+    for (int64_t k = 0; k < ray->filled; k++)
+        if (end_at(cut->stock, ray, 2 * k)->at < high && end_at(cut->stock, ray, 2 * k + 1)->at > low)
             return true;
     return false;
 }
@@ -284,7 +283,7 @@ static double bound_of(const Cut *cut, const Hit *hit, int end, double ahead) {
 }
 
 /* Tell whether there is something to gain between the end that is known and a bound of it. */
-static bool may_gain(const Cut *cut, int64_t ray, int end, double known, double bound) {
+static bool may_gain(const Cut *cut, const Ray *ray, int end, double known, double bound) {
     const double sense = end == 0 ? 1.0 : -1.0;
     return (known - bound) * sense >= cut->fine_mm && has_between(cut, ray, bound, known);
 }
@@ -299,7 +298,7 @@ static void gain(const Hit *here, int end, Hit *best) {
 
 /* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
    whose slopes say that it lies between them. A pose that misses has none. */
-static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, const Hit *at_a, double b,
+static void widen(const Cut *cut, const Ray *ray, const double *place, int end, double a, const Hit *at_a, double b,
                   const Hit *at_b, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
     Hit room[3]; /* two poses that are held against the ray, and the one that is tried */
@@ -360,7 +359,7 @@ static double nearest_share(const Cut *cut, const double *place) {
 
 /* Write what the whole step covers on a ray, as far as there is material: the pose whose axis is nearest to it is held against it
    first, and its first and last pose only where the tangents there leave something to gain. */
-static void swept(const Cut *cut, int64_t ray, const double *place, Hit *best) {
+static void swept(const Cut *cut, const Ray *ray, const double *place, Hit *best) {
     const double share = nearest_share(cut, place);
     Hit near, outer[2];
     hold(cut, place, share, best);
@@ -406,58 +405,47 @@ static int32_t packed(const double *normal, int32_t stamp) {
 }
 
 /* Give a ray room for so many stretches, behind all others where it has less; return false where there is none. */
-static bool has_room(const Dexels *dexels, int64_t ray, int64_t wanted) {
-    if (wanted <= AT(dexels->room, ray))
+static bool has_room(const Dexels *dexels, Ray *ray, int64_t wanted) {
+    if (wanted <= ray->room)
         return true;
-    const int64_t room = 2 * (int64_t)AT(dexels->room, ray), used = AT(dexels->used, 0);
+    const int64_t room = 2 * (int64_t)ray->room, used = AT(dexels->used, 0);
     if (wanted > TD_MOST || used + 2 * room > dexels->ends.rows)
         return false;
-    AT(dexels->first, ray) = (int32_t)used;
-    AT(dexels->room, ray) = (int32_t)room;
+    ray->first = (int32_t)used;
+    ray->room = (uint8_t)room;
     AT(dexels->used, 0) = used + 2 * room;
     return true;
 }
 
 /* Take what is covered out of a ray, and put a stamp on the ends that it gets; return false where it has no room. */
-static bool take(const Stock *stock, int64_t ray, const Hit *hit, int32_t stamp, double *longest) {
+static bool take(const Stock *stock, Ray *ray, const Hit *hit, int32_t stamp, double *longest) {
     const float low = (float)hit->at[0], high = (float)hit->at[1];
-    const int64_t count = AT(stock->of->filled, ray);
     int64_t left = 0;
-    float ends[2 * TD_MOST + 2];
-    int32_t facing[2 * TD_MOST + 2];
-    for (int64_t k = 0; k < count; k++) {
-        const float a = *end_at(stock, ray, 2 * k), b = *end_at(stock, ray, 2 * k + 1);
-        const int32_t at_a = *facing_at(stock, ray, 2 * k), at_b = *facing_at(stock, ray, 2 * k + 1);
-        const bool is_before = low - a > (float)THIN_MM, is_behind = b - high > (float)THIN_MM;
-        const float cut = (b < high ? b : high) - (a > low ? a : low);
+    RayEnd ends[2 * TD_MOST + 2];
+    for (int64_t k = 0; k < ray->filled; k++) {
+        const RayEnd a = *end_at(stock, ray, 2 * k), b = *end_at(stock, ray, 2 * k + 1);
+        const bool is_before = low - a.at > (float)THIN_MM, is_behind = b.at - high > (float)THIN_MM;
+        const float cut = (b.at < high ? b.at : high) - (a.at > low ? a.at : low);
         if (!(cut > (float)THIN_MM)) {
             ends[2 * left] = a;
-            ends[2 * left + 1] = b;
-            facing[2 * left] = at_a;
-            facing[2 * left++ + 1] = at_b;
+            ends[2 * left++ + 1] = b;
             continue;
         }
         *longest = greater(*longest, cut);
         if (is_before) {
             ends[2 * left] = a;
-            ends[2 * left + 1] = low;
-            facing[2 * left] = at_a;
-            facing[2 * left++ + 1] = packed(hit->normal[0], stamp);
+            ends[2 * left++ + 1] = (RayEnd){low, packed(hit->normal[0], stamp)};
         }
         if (is_behind) {
-            ends[2 * left] = high;
-            ends[2 * left + 1] = b;
-            facing[2 * left] = packed(hit->normal[1], stamp);
-            facing[2 * left++ + 1] = at_b;
+            ends[2 * left] = (RayEnd){high, packed(hit->normal[1], stamp)};
+            ends[2 * left++ + 1] = b;
         }
     }
     if (!has_room(stock->of, ray, left))
         return false;
-    for (int64_t k = 0; k < 2 * left; k++) {
+    for (int64_t k = 0; k < 2 * left; k++)
         *end_at(stock, ray, k) = ends[k];
-        *facing_at(stock, ray, k) = facing[k];
-    }
-    AT(stock->of->filled, ray) = (int32_t)left;
+    ray->filled = (uint8_t)left;
     return true;
 }
 
@@ -499,10 +487,10 @@ static void bound_block(const Stock *stock, const Field *field, int64_t row, int
     float low = INFINITY, high = -INFINITY;
     for (int64_t i = row * SIDE; i < least((row + 1) * SIDE, field->rows); i++)
         for (int64_t j = column * SIDE; j < least((column + 1) * SIDE, field->columns); j++) {
-            const int64_t ray = field->first + i * field->columns + j, count = AT(stock->of->filled, ray);
-            if (count == 0)
+            const Ray *ray = ray_at(stock, field, i, j);
+            if (ray->filled == 0)
                 continue;
-            const float first = *end_at(stock, ray, 0), last = *end_at(stock, ray, 2 * count - 1);
+            const float first = end_at(stock, ray, 0)->at, last = end_at(stock, ray, 2 * ray->filled - 1)->at;
             low = first < low ? first : low;
             high = last > high ? last : high;
         }
@@ -512,12 +500,12 @@ static void bound_block(const Stock *stock, const Field *field, int64_t row, int
 }
 
 /* Return whether a ray has material where the body reaches; widen the bounds of it. */
-static bool is_reached(const Cut *cut, int64_t ray, double *low, double *high) {
+static bool is_reached(const Cut *cut, const Ray *ray, double *low, double *high) {
     const int axis = cut->field->axis;
     bool is = false;
-    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++) {
-        const double a = greater(*end_at(cut->stock, ray, 2 * k), cut->low[axis]);
-        const double b = lesser(*end_at(cut->stock, ray, 2 * k + 1), cut->high[axis]);
+    for (int64_t k = 0; k < ray->filled; k++) {
+        const double a = greater(end_at(cut->stock, ray, 2 * k)->at, cut->low[axis]);
+        const double b = lesser(end_at(cut->stock, ray, 2 * k + 1)->at, cut->high[axis]);
         if (b - a > THIN_MM) {
             *low = lesser(*low, a);
             *high = greater(*high, b);
@@ -542,7 +530,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
     high[field->axis] = -INFINITY;
     for (int64_t i = i0, at = 0; i < i1; i++)
         for (int64_t j = j0; j < j1; j++)
-            is_in[at++] = is_reached(cut, field->first + i * field->columns + j, &low[field->axis], &high[field->axis]);
+            is_in[at++] = is_reached(cut, ray_at(stock, field, i, j), &low[field->axis], &high[field->axis]);
     low[field->u] = middle_of(stock, field->u, j0);
     high[field->u] = middle_of(stock, field->u, j1 - 1);
     low[field->v] = middle_of(stock, field->v, i0);
@@ -555,7 +543,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
                 continue;
             place[field->u] = middle_of(stock, field->u, j);
             place[field->v] = middle_of(stock, field->v, i);
-            const int64_t ray = field->first + i * field->columns + j;
+            Ray *ray = ray_at(stock, field, i, j);
             Hit hit;
             swept(cut, ray, place, &hit);
             if (hit.hits)
@@ -613,19 +601,19 @@ double depth_at(const Stock *stock, const double *place, double near_mm) {
     }
     for (int axis = 0; axis < 3; axis++) {
         const Field *field = &stock->fields[axis];
-        const int64_t ray = field->first + cell[field->v] * field->columns + cell[field->u], count = AT(stock->of->filled, ray);
+        const Ray *ray = ray_at(stock, field, cell[field->v], cell[field->u]);
         int64_t after = 0; /* the first end behind the place */
-        while (after < 2 * count && *end_at(stock, ray, after) <= (float)place[axis])
+        while (after < 2 * ray->filled && end_at(stock, ray, after)->at <= (float)place[axis])
             after++;
         inside += after % 2;
         double own = 0.0, own_square = INFINITY;
         for (int64_t end = after - 1; end <= after; end++) {
-            if (end < 0 || end >= 2 * count)
+            if (end < 0 || end >= 2 * ray->filled)
                 continue;
             double off[3], depth = 0.0;
-            off[axis] = place[axis] - *end_at(stock, ray, end);
+            off[axis] = place[axis] - end_at(stock, ray, end)->at;
             free = lesser(free, fabs(off[axis]));
-            const int32_t facing = *facing_at(stock, ray, end);
+            const int32_t facing = end_at(stock, ray, end)->facing;
             const double steep = fabs(unpacked(facing, axis));
             if (fabs(off[axis]) * steep > 1.5 * near_mm)
                 continue;
@@ -707,10 +695,10 @@ EXPORT void cutting_bodies_dexels(const Dexels *dexels, Floats ends_mm, Floats r
             CELL(place_mm, n, k) = NAN;
         for (int64_t i = v[0]; i < v[1]; i++)
             for (int64_t j = u[0]; j < u[1]; j++) {
-                const int64_t ray = i * field->columns + j + field->first;
+                const Ray *ray = ray_at(stock, field, i, j);
                 const double x = middle_of(stock, 0, j), y = middle_of(stock, 1, i);
-                for (int64_t k = 0; k < AT(stock->of->filled, ray); k++) {
-                    const double low = *end_at(stock, ray, 2 * k), high = *end_at(stock, ray, 2 * k + 1);
+                for (int64_t k = 0; k < ray->filled; k++) {
+                    const double low = end_at(stock, ray, 2 * k)->at, high = end_at(stock, ray, 2 * k + 1)->at;
                     if (high <= lesser(a[2], b[2]) - wide || low >= greater(a[2], b[2]) + wide)
                         continue;
                     const double stretch[6] = {x, y, low, x, y, high};
