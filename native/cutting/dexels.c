@@ -627,9 +627,17 @@ double depth_at(const Stock *stock, const double *place, double near_mm) {
             return -beyond;
         cell[axis] = cell_of(stock, axis, place[axis]);
     }
+    const Ray *rays[3];
     for (int axis = 0; axis < 3; axis++) {
         const Field *field = &stock->fields[axis];
-        const Ray *ray = ray_at(stock, field, cell[field->v], cell[field->u]);
+        rays[axis] = ray_at(stock, field, cell[field->v], cell[field->u]);
+        __builtin_prefetch(rays[axis]); /* what it takes is to wait for memory */
+    }
+    for (int axis = 0; axis < 3; axis++)
+        __builtin_prefetch(end_at(stock, rays[axis], 0));
+    for (int axis = 0; axis < 3; axis++) {
+        const Field *field = &stock->fields[axis];
+        const Ray *ray = rays[axis];
         int64_t after = 0; /* the first end behind the place */
         while (after < 2 * ray->filled && end_at(stock, ray, after)->at <= (float)place[axis])
             after++;
