@@ -17,6 +17,7 @@ poses. Each band of the edge has the chip of its own place on a rigid body that 
 #define SHARE_NEAR 0.05     /* of the force: what may lie beside the line between two nodes */
 
 #define SHARE_ALIKE 0.05    /* by which the share of a bin may lie beside the line between two others */
+#define CROSSES 0.5         /* change of depth along a stretch, as a share of it, from which on its surface does not graze it */
 #define SEARCH_EDGE 0.1     /* of a stretch that is searched: so far from its ends it is read */
 
 /* Bins from one that is read in any case to the next, and those of which one in the middle may speak for all. */
@@ -274,16 +275,20 @@ static float ring_depth(const Turning *turning, const Place *place, const Edge *
 }
 
 /* Return the share of a band that is engaged in a bin: where the material ends between its rings is searched, until the surface
-   is near on both sides, or for so many times. */
+   is near on both sides and passes between them, or for so many times. */
 static double share_of(const Turning *turning, const Place *place, const Edge *edge, int64_t bin) {
     const Band *band = edge->band;
     const float first = ring_depth(turning, place, edge, false, bin), last = ring_depth(turning, place, edge, true, bin);
     if ((first > 0.0f) == (last > 0.0f))
         return first > 0.0f ? 1.0 : 0.0;
     const double known_mm = (1.0 - 2.0 * FEEL_OF_NEAR) * turning->near_mm;
+    const double length_mm = hypot(band->high - band->low, band->r_high - band->r_low);
     double low = 0.0, high = 1.0, at_low = first, at_high = last;
-    for (int search = 0; search < SEARCHES && (fabs(at_low) > known_mm || fabs(at_high) > known_mm); search++) {
-        const double share = clamped(at_low / (at_low - at_high), SEARCH_EDGE, 1.0 - SEARCH_EDGE);
+    for (int search = 0; search < SEARCHES; search++) {
+        const bool is_known = greater(fabs(at_low), fabs(at_high)) < known_mm;
+        if (is_known && fabs(at_low - at_high) > CROSSES * (high - low) * length_mm)
+            break;
+        const double share = is_known ? 0.5 : clamped(at_low / (at_low - at_high), SEARCH_EDGE, 1.0 - SEARCH_EDGE);
         const double middle = low + share * (high - low);
         const double here = depth_on(turning, place, band->r_low + middle * (band->r_high - band->r_low),
                                      band->low + middle * (band->high - band->low), bin);
