@@ -104,7 +104,15 @@ _VIEWS = {
     "u1": "Bytes",
     "b1": "Bools",
 }
-_TYPES = {"f8": "double", "f4": "float", "i8": "int64_t", "i4": "int32_t", "i1": "int8_t", "u1": "uint8_t", "b1": "uint8_t"}
+_TYPES = {
+    "f8": "double",
+    "f4": "float",
+    "i8": "int64_t",
+    "i4": "int32_t",
+    "i1": "int8_t",
+    "u1": "uint8_t",
+    "b1": "uint8_t",
+}
 
 
 def header() -> str:

@@ -51,7 +51,7 @@ class Dexels(NamedTuple):
     ends: NDArray[np.void]
     """(e,) records `END`, in pairs; those of a ray are together."""
     rays: NDArray[np.void]
-    """(rays,) records `RAY`, those of a block together, row after row; also where it reaches beyond the field."""
+    """(rays,) records `RAY`, those of a block together, also where it reaches beyond the field."""
     used: Ints
     """(1,) ends that belong to rays; a ray that needs more room gets it behind them."""
     bound: NDArray[np.float32]
