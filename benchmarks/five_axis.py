@@ -329,7 +329,7 @@ def print_chain():
     print(f"five_axis/five_axis.nc: {turning_us:.0f} µs", flush=True)
     block = dexel_block(np.array([[0.0, 0.0, 0.0], [300.0, 200.0, 50.0]]), 0.5)
     size = sum(column.nbytes for column in block)
-    print(f"memory: {len(block.filled):,} rays of 300 x 200 x 50 mm at 0.5 mm cells, {size / 1e6:.0f} MB")
+    print(f"memory: {len(block.rays):,} rays of 300 x 200 x 50 mm at 0.5 mm cells, {size / 1e6:.0f} MB")
 
 
 def main():

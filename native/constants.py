@@ -69,6 +69,8 @@ RECORDS = {
     "Label": ("gcode2krl.gcode.program_tables", "LABEL"),
     "Array": ("gcode2krl.gcode.program_tables", "ARRAY"),
     "Course": ("gcode2krl.gcode.program_tables", "COURSE"),
+    "Ray": ("gcode2krl.cutting.dexels", "RAY"),
+    "RayEnd": ("gcode2krl.cutting.dexels", "END"),
 }
 """Name of the struct -> module and numpy record."""
 ARGUMENTS = {
@@ -102,7 +104,15 @@ _VIEWS = {
     "u1": "Bytes",
     "b1": "Bools",
 }
-_TYPES = {"f8": "double", "i8": "int64_t", "i4": "int32_t", "i1": "int8_t", "u1": "uint8_t", "b1": "uint8_t"}
+_TYPES = {
+    "f8": "double",
+    "f4": "float",
+    "i8": "int64_t",
+    "i4": "int32_t",
+    "i1": "int8_t",
+    "u1": "uint8_t",
+    "b1": "uint8_t",
+}
 
 
 def header() -> str:

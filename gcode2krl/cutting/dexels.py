@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcode2krl.arrays import Floats, Ints, Ints32
-from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, StructOf, core_function
+from gcode2krl.compiled.core import (
+    FLOAT,
+    FLOATS,
+    INTS,
+    OUT_FLOATS,
+    OUT_FLOATS32,
+    OUT_INTS,
+    ArrayOf,
+    StructOf,
+    core_function,
+)
 from gcode2krl.errors import input_error
 
 if TYPE_CHECKING:
@@ -26,6 +36,10 @@ CELLS_PER_DIAMETER = 32.0
 MAX_RAYS = 8_000_000
 SHORTENED = 127
 """Length of a packed normal."""
+RAY = np.dtype([("first", "i4"), ("filled", "u1"), ("room", "u1")], align=True)
+"""A ray: place of its first end, stretches that it has, and for which there is room there."""
+END = np.dtype([("at", "f4"), ("facing", "i4")])
+"""Where material begins or ends; the normal of the surface out of it, three signed bytes, above a stamp."""
 
 
 class Dexels(NamedTuple):
@@ -34,16 +48,10 @@ class Dexels(NamedTuple):
     They change while they are cut; lengths in mm, in ``$BASE``.
     """
 
-    ends: NDArray[np.float32]
-    """(e,) where material begins and ends, in pairs; those of a ray are together, from `first` on."""
-    facing: Ints32
-    """(e,) normal of the surface out of the material at each end, three signed bytes; above a stamp."""
-    first: Ints32
-    """(rays,) place of a ray's first end."""
-    room: Ints32
-    """(rays,) stretches for which there is room there."""
-    filled: Ints32
-    """(rays,) stretches that a ray has."""
+    ends: NDArray[np.void]
+    """(e,) records `END`, in pairs; those of a ray are together."""
+    rays: NDArray[np.void]
+    """(rays,) records `RAY`, those of a block together, also where it reaches beyond the field."""
     used: Ints
     """(1,) ends that belong to rays; a ray that needs more room gets it behind them."""
     bound: NDArray[np.float32]
@@ -78,8 +86,10 @@ class Dexels(NamedTuple):
 
     def with_room(self) -> "Dexels":
         """Return the same with room for twice as many ends; raises where a ray has all that it may have."""
-        _refuse_more_than(MOST - 1, self.filled)
-        return self._replace(ends=_twice(self.ends), facing=_twice(self.facing))
+        _refuse_more_than(MOST - 1, self.rays["filled"])
+        more = np.zeros(2 * len(self.ends), END)
+        more[: len(self.ends)] = self.ends
+        return self._replace(ends=more)
 
     def stretches(self) -> tuple[Ints, Floats]:
         """Return the ray (s,) of each stretch of material, rising, and both its ends (s, 2) in mm."""
@@ -122,8 +132,16 @@ class Dexels(NamedTuple):
         return depth, place
 
 
-_CUT = ("ends", "facing", "first", "room", "filled", "used", "bound")
-DEXELS = StructOf.record(Dexels, written=_CUT)
+_CUT = ("ends", "rays", "used", "bound")
+DEXELS = StructOf(
+    ends=ArrayOf(END, written=True),
+    rays=ArrayOf(RAY, written=True),
+    used=OUT_INTS,
+    bound=OUT_FLOATS32,
+    low_mm=FLOATS,
+    cell_mm=FLOATS,
+    cells=INTS,
+)
 _bound = core_function("cutting_bound_dexels", DEXELS)
 _depths = core_function("cutting_depths", DEXELS, FLOATS, FLOAT, OUT_FLOATS)
 _volume = core_function("cutting_dexel_volume", DEXELS, returns=FLOAT)
@@ -142,10 +160,10 @@ def dexel_block(box_mm: Floats, cell_mm: float) -> Dexels:
     block = _with_ends(low_mm, size_mm, cells, np.ones(firsts[3], dtype=np.int64))
     for axis in range(3):
         ends = slice(2 * firsts[axis], 2 * firsts[axis + 1])
-        block.ends[ends].reshape(-1, 2)[:] = box_mm[0][axis], box_mm[1][axis]
+        block.ends["at"][ends].reshape(-1, 2)[:] = box_mm[0][axis], box_mm[1][axis]
         normals = np.zeros((2, 3))
         normals[:, axis] = -1.0, 1.0
-        block.facing[ends].reshape(-1, 2)[:] = _packed(normals)
+        block.ends["facing"][ends].reshape(-1, 2)[:] = _packed(normals)
     _bound(block)
     return block
 
@@ -157,9 +175,9 @@ def dexel_mesh(mesh: "trimesh.Trimesh", cell_mm: float) -> Dexels:
     count = np.bincount(ray, minlength=_firsts(cells)[3])
     _refuse_more_than(MOST, count // 2)
     dexels = _with_ends(low_mm, size_mm, cells, -(-count // 2))
-    dexels.filled[:] = count // 2
-    place = dexels.first[ray] + np.arange(len(ray)) - np.repeat(np.cumsum(count) - count, count)
-    dexels.ends[place], dexels.facing[place] = at, _packed(normal)
+    dexels.rays["filled"] = count // 2
+    place = dexels.rays["first"][ray] + np.arange(len(ray)) - np.repeat(np.cumsum(count) - count, count)
+    dexels.ends["at"][place], dexels.ends["facing"][place] = at, _packed(normal)
     _bound(dexels)
     return dexels
 
@@ -207,7 +225,7 @@ def _crossed(
         row, column = np.nonzero(inside)
         at_x, at_y = x[column], y[row, 0]
         depth = normal[u] * (at_x - corners[0, u]) + normal[v] * (at_y - corners[0, v])
-        rays.append(spans[v][row] * cells[u] + spans[u][column])
+        rays.append(_ray(spans[v][row], spans[u][column], cells[u]))
         places.append(corners[0, axis] - depth / normal[axis])
         normals.append(np.broadcast_to(normal / np.linalg.norm(normal), (len(row), 3)))
     return np.concatenate(rays), np.concatenate(places), np.concatenate(normals)
@@ -233,25 +251,17 @@ def _with_ends(low_mm: Floats, cell_mm: Floats, cells: Ints, stretches: Ints) ->
     room = np.maximum(stretches, 1)
     after = 2 * np.cumsum(room)
     used = int(after[-1])
-    blocks = sum(-(-int(cells[(k + 1) % 3]) // SIDE) * -(-int(cells[(k + 2) % 3]) // SIDE) for k in range(3))
+    rays = np.zeros(len(stretches), RAY)
+    rays["first"], rays["filled"], rays["room"] = after - 2 * room, stretches, room
     return Dexels(
-        ends=np.zeros(2 * used, np.float32),  # what no ray uses yet takes no memory
-        facing=np.zeros(2 * used, np.int32),
-        first=(after - 2 * room).astype(np.int32),
-        room=room.astype(np.int32),
-        filled=stretches.astype(np.int32),
+        ends=np.zeros(2 * used, END),  # what no ray uses yet takes no memory
+        rays=rays,
         used=np.array([used]),
-        bound=np.empty((blocks, 2), np.float32),
+        bound=np.empty((len(rays) // SIDE**2, 2), np.float32),
         low_mm=low_mm,
         cell_mm=cell_mm,
         cells=cells,
     )
-
-
-def _twice(ends: NDArray[Any]) -> NDArray[Any]:
-    more = np.zeros(2 * len(ends), ends.dtype)
-    more[: len(ends)] = ends
-    return more
 
 
 def _refuse_more_than(most: int, stretches: NDArray[np.integer[Any]]) -> None:
@@ -266,7 +276,14 @@ def _refuse_more_than(most: int, stretches: NDArray[np.integer[Any]]) -> None:
 
 def _firsts(cells: Ints) -> Ints:
     """Return the first ray of each field, and the number of all."""
-    return np.concatenate([[0], np.cumsum([cells[(k + 1) % 3] * cells[(k + 2) % 3] for k in range(3)])])
+    blocks = -(-cells // SIDE)
+    return SIDE**2 * np.append(0, np.cumsum([blocks[(k + 1) % 3] * blocks[(k + 2) % 3] for k in range(3)]))
+
+
+def _ray(row: Ints, column: Ints, columns: int) -> Ints:
+    """Return the place of rays (n,) in a field of so many columns."""
+    block = row // SIDE * -(-columns // SIDE) + column // SIDE
+    return SIDE * (SIDE * block + row % SIDE) + column % SIDE
 
 
 def _packed(normals: Floats) -> Ints32:

@@ -10,12 +10,12 @@ a plane parts them from the body at both poses. */
 #include "collision/shapes.h"
 
 #define NEAR_MM 2e-6       /* a place is on a body */
-#define CLOSE_MM 1e-3      /* a last step of Newton from there ends on it, where the ray is so steep */
-#define STEEP 0.3
 #define THIN_MM 1e-4       /* a stretch that is shorter is none; an end that moves by less stays */
 #define PARTED_MM 1e-5     /* a plane parts where it does so by no less than minus this */
 #define FINE 0.02          /* of a cell: where a swept surface may be beside the true one */
 #define PARALLEL 1e-6      /* cosine between ray and surface below which its slope says nothing of the step */
+#define ROOM 0.577          /* of how far rays are free along all three axes: where a plane that passes one of them may be */
+#define FREE_MM 1e3         /* as far as a ray without an end is free */
 #define GRAZES 1e-9        /* cosine between ray and surface below which it has no slope */
 
 enum { SIDE = TD_SIDE, MOST_NEWTON = 40, MOST_HALVINGS = 10 };
@@ -26,7 +26,9 @@ typedef struct {
     const Step *step;
     const Field *field;
     Pose first, middle, last;
+    bool turns;
     double low[3], high[3]; /* how far it reaches */
+    double way[2], per_across, per_square; /* of the tip as seen along the rays: see nearest_share */
     double fine_mm;         /* where a surface may be beside the swept one */
 } Cut;
 
@@ -38,16 +40,15 @@ typedef struct {
 
 Stock stock_of(const Dexels *dexels) {
     Stock stock = {.of = dexels};
-    int64_t rays = 0, blocks = 0;
+    int64_t blocks = 0;
     for (int axis = 0; axis < 3; axis++) {
         const int u = (axis + 1) % 3, v = (axis + 2) % 3;
         const int64_t columns = AT(dexels->cells, u), rows = AT(dexels->cells, v);
         const int64_t block_columns = (columns + SIDE - 1) / SIDE;
-        stock.fields[axis] = (Field){axis, u, v, columns, rows, rays, block_columns, blocks};
+        stock.fields[axis] = (Field){axis, u, v, columns, rows, block_columns, blocks};
         stock.low[axis] = AT(dexels->low_mm, axis);
         stock.cell[axis] = AT(dexels->cell_mm, axis);
         stock.cells[axis] = AT(dexels->cells, axis);
-        rays += columns * rows;
         blocks += block_columns * ((rows + SIDE - 1) / SIDE);
     }
     return stock;
@@ -61,8 +62,9 @@ Pose pose_at(const Step *step, double share) {
         pose.axis[k] = step->from.axis[k] + share * step->turn[k];
         square += squared(pose.axis[k]);
     }
+    const double unit = 1.0 / sqrt(square);
     for (int k = 0; k < 3; k++)
-        pose.axis[k] /= sqrt(square);
+        pose.axis[k] *= unit;
     return pose;
 }
 
@@ -117,23 +119,27 @@ typedef struct {
     double off[3], height, climb, a, b, c;
 } Seen;
 
+/* A place on a ray near a body: how far along, its height and radius there, the direction away from the surface. */
+typedef struct {
+    double at, height, radius, away[2];
+} Met;
+
 /* Move a place on a ray towards the body, from outside of it, until it is on its surface; returns false where it is
    passed by. How far outside is convex along the ray, so that Newton's steps never go too far. */
-static bool approach(const Body *body, const Seen *seen, double sense, double limit, double *at, double away[2]) {
+static bool approach(const Body *body, const Seen *seen, double sense, double limit, Met *met) {
     for (int round = 0; round < MOST_NEWTON; round++) {
-        const double s = *at, height = seen->height + s * seen->climb;
-        const double radius = sqrt(greater((seen->a * s + 2.0 * seen->b) * s + seen->c, 1e-18));
-        const double outside = outside_of(body, radius, height, away);
+        const double s = met->at;
+        met->height = seen->height + s * seen->climb;
+        met->radius = sqrt(greater((seen->a * s + 2.0 * seen->b) * s + seen->c, 1e-18));
+        const double outside = outside_of(body, met->radius, met->height, met->away);
         if (outside <= NEAR_MM)
             return true;
-        const double slope = away[0] * (seen->a * s + seen->b) / radius + away[1] * seen->climb;
+        const double slope = met->away[0] * (seen->a * s + seen->b) / met->radius + met->away[1] * seen->climb;
         if (slope * sense >= -GRAZES)
             return false;
-        *at = s - outside / slope;
-        if ((*at - limit) * sense > 0.0)
+        met->at = s - outside / slope;
+        if ((met->at - limit) * sense > 0.0)
             return false;
-        if (outside < CLOSE_MM && fabs(slope) > STEEP)
-            return true;
     }
     return true;
 }
@@ -185,7 +191,7 @@ static bool begin_on_cone(const Body *body, const Seen *seen, double *ends) {
 static bool narrow(double first, double change, double limit, double *low, double *high) {
     if (fabs(change) < 1e-12)
         return first >= -NEAR_MM && first <= limit;
-    const double a = -first / change, b = (limit - first) / change;
+    const double slow = 1.0 / change, a = -first * slow, b = (limit - first) * slow;
     *low = greater(*low, lesser(a, b));
     *high = lesser(*high, greater(a, b));
     return *low < *high;
@@ -195,7 +201,11 @@ static bool narrow(double first, double change, double limit, double *low, doubl
 static void hold(const Cut *cut, const double *place, double share, Hit *hit) {
     const Body *body = cut->body;
     const int axis = cut->field->axis, u = cut->field->u, v = cut->field->v;
-    const Pose pose = share == 0.0 ? cut->first : share == 1.0 ? cut->last : pose_at(cut->step, share);
+    Pose pose = share == 0.0 ? cut->first : cut->last;
+    if (share > 0.0 && share < 1.0 && cut->turns)
+        pose = pose_at(cut->step, share);
+    else if (share > 0.0 && share < 1.0)
+        between3(cut->first.tip, cut->last.tip, share, pose.tip);
     hit->hits = false;
     Seen seen;
     seen.off[axis] = 0.0;
@@ -215,33 +225,32 @@ static void hold(const Cut *cut, const double *place, double share, Hit *hit) {
         const double root = seen.b * seen.b - seen.a * over;
         if (root <= 0.0)
             return;
-        ends[0] = greater(ends[0], (-seen.b - sqrt(root)) / seen.a);
-        ends[1] = lesser(ends[1], (-seen.b + sqrt(root)) / seen.a);
+        const double wide = sqrt(root), longer = 1.0 / seen.a;
+        ends[0] = greater(ends[0], (-seen.b - wide) * longer);
+        ends[1] = lesser(ends[1], (-seen.b + wide) * longer);
     } else if (over >= 0.0) {
         return;
     }
     if (!(ends[0] < ends[1]))
         return;
-    double away[2][2];
     if (body->cos_kappa > 0.0 && !begin_on_cone(body, &seen, ends))
         return;
     if (body->bottom == 0.0 && body->corner > 0.0 && !begin_on_ball(body, &seen, ends))
         return;
-    if (!approach(body, &seen, 1.0, ends[1], &ends[0], away[0]) ||
-        !approach(body, &seen, -1.0, ends[0], &ends[1], away[1]))
+    Met met[2] = {{.at = ends[0]}, {.at = ends[1]}};
+    if (!approach(body, &seen, 1.0, met[1].at, &met[0]) || !approach(body, &seen, -1.0, met[0].at, &met[1]))
         return;
     hit->hits = true;
     for (int end = 0; end < 2; end++) {
         double *normal = hit->normal[end], move = 0.0;
-        seen.off[axis] = ends[end];
-        const double height = seen.height + ends[end] * seen.climb;
-        const double radius = sqrt(greater((seen.a * ends[end] + 2.0 * seen.b) * ends[end] + seen.c, 1e-18));
-        const double turns = dot3(cut->step->turn, seen.off);
+        seen.off[axis] = met[end].at;
+        const double height = met[end].height, aside = met[end].away[0] / met[end].radius;
+        const double turns = dot3(cut->step->turn, seen.off), along = met[end].away[1] - aside * height;
         for (int k = 0; k < 3; k++) {
-            normal[k] = away[end][0] * (seen.off[k] - height * pose.axis[k]) / radius + away[end][1] * pose.axis[k];
+            normal[k] = aside * seen.off[k] + along * pose.axis[k];
             move += normal[k] * (cut->step->way[k] + cut->step->turn[k] * height - pose.axis[k] * turns);
         }
-        hit->at[end] = pose.tip[axis] + ends[end];
+        hit->at[end] = pose.tip[axis] + met[end].at;
         hit->slope[end] = fabs(normal[axis]) < GRAZES ? 0.0 : move / normal[axis];
     }
 }
@@ -264,10 +273,10 @@ static void face(const Cut *cut, int end, const Hit *from, const Hit *to, double
 }
 
 /* Tell whether a ray has material between two places on it, in either order. */
-static bool has_between(const Cut *cut, int64_t ray, double a, double b) {
+static bool has_between(const Cut *cut, const Ray *ray, double a, double b) {
     const double low = lesser(a, b) - cut->fine_mm, high = greater(a, b) + cut->fine_mm;
-    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++)
-        if (*end_at(cut->stock, ray, 2 * k) < high && *end_at(cut->stock, ray, 2 * k + 1) > low)
+    for (int64_t k = 0; k < ray->filled; k++)
+        if (end_at(cut->stock, ray, 2 * k)->at < high && end_at(cut->stock, ray, 2 * k + 1)->at > low)
             return true;
     return false;
 }
@@ -282,7 +291,7 @@ static double bound_of(const Cut *cut, const Hit *hit, int end, double ahead) {
 }
 
 /* Tell whether there is something to gain between the end that is known and a bound of it. */
-static bool may_gain(const Cut *cut, int64_t ray, int end, double known, double bound) {
+static bool may_gain(const Cut *cut, const Ray *ray, int end, double known, double bound) {
     const double sense = end == 0 ? 1.0 : -1.0;
     return (known - bound) * sense >= cut->fine_mm && has_between(cut, ray, bound, known);
 }
@@ -297,7 +306,7 @@ static void gain(const Hit *here, int end, Hit *best) {
 
 /* Widen `best` to the end of what the part of the step from a to b covers on a ray, entry (0) or exit (1): between two poses
    whose slopes say that it lies between them. A pose that misses has none. */
-static void widen(const Cut *cut, int64_t ray, const double *place, int end, double a, const Hit *at_a, double b,
+static void widen(const Cut *cut, const Ray *ray, const double *place, int end, double a, const Hit *at_a, double b,
                   const Hit *at_b, Hit *best) {
     const double sense = end == 0 ? 1.0 : -1.0;
     Hit room[3]; /* two poses that are held against the ray, and the one that is tried */
@@ -341,24 +350,34 @@ static void widen(const Cut *cut, int64_t ray, const double *place, int end, dou
         face(cut, end, from, to, best->normal[end]);
 }
 
+/* Take what nearest_share needs of a field. */
+static void look_along(Cut *cut) {
+    const int u = cut->field->u, v = cut->field->v;
+    const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
+    const double across = way_u * cut->middle.axis[v] - way_v * cut->middle.axis[u], square = way_u * way_u + way_v * way_v;
+    const bool is_level = square < 1e-12 || fabs(across) < 1e-6 * sqrt(square);
+    cut->way[0] = way_u;
+    cut->way[1] = way_v;
+    cut->per_across = is_level ? 0.0 : 1.0 / across;
+    cut->per_square = is_level ? 0.0 : 1.0 / square;
+}
+
 /* Return the share of the step at which the axis of the body, as seen along the rays, is nearest to a ray; its end where that is
    the same all the way. */
 static double nearest_share(const Cut *cut, const double *place) {
+    if (cut->per_square == 0.0)
+        return 1.0;
     const int u = cut->field->u, v = cut->field->v;
     const Pose *middle = &cut->middle;
-    const double low = cut->body->corner, high = cut->body->top;
-    const double way_u = cut->last.tip[u] - cut->first.tip[u], way_v = cut->last.tip[v] - cut->first.tip[v];
     const double off_u = place[u] - middle->tip[u], off_v = place[v] - middle->tip[v];
-    const double across = way_u * middle->axis[v] - way_v * middle->axis[u], square = way_u * way_u + way_v * way_v;
-    if (square < 1e-12 || fabs(across) < 1e-6 * sqrt(square))
-        return 1.0;
-    const double up = clamped((way_u * off_v - way_v * off_u) / across, low, high);
-    return clamped(0.5 + ((off_u - up * middle->axis[u]) * way_u + (off_v - up * middle->axis[v]) * way_v) / square, 0.0, 1.0);
+    const double up = clamped((cut->way[0] * off_v - cut->way[1] * off_u) * cut->per_across, cut->body->corner, cut->body->top);
+    const double along = (off_u - up * middle->axis[u]) * cut->way[0] + (off_v - up * middle->axis[v]) * cut->way[1];
+    return clamped(0.5 + along * cut->per_square, 0.0, 1.0);
 }
 
 /* Write what the whole step covers on a ray, as far as there is material: the pose whose axis is nearest to it is held against it
    first, and its first and last pose only where the tangents there leave something to gain. */
-static void swept(const Cut *cut, int64_t ray, const double *place, Hit *best) {
+static void swept(const Cut *cut, const Ray *ray, const double *place, Hit *best) {
     const double share = nearest_share(cut, place);
     Hit near, outer[2];
     hold(cut, place, share, best);
@@ -403,59 +422,56 @@ static int32_t packed(const double *normal, int32_t stamp) {
     return (int32_t)bits;
 }
 
-/* Give a ray room for so many stretches, behind all others where it has less; return false where there is none. */
-static bool has_room(const Dexels *dexels, int64_t ray, int64_t wanted) {
-    if (wanted <= AT(dexels->room, ray))
-        return true;
-    const int64_t room = 2 * (int64_t)AT(dexels->room, ray), used = AT(dexels->used, 0);
-    if (wanted > TD_MOST || used + 2 * room > dexels->ends.rows)
-        return false;
-    AT(dexels->first, ray) = (int32_t)used;
-    AT(dexels->room, ray) = (int32_t)room;
-    AT(dexels->used, 0) = used + 2 * room;
+/* Make two stretches of one on a ray, which is moved behind all others where it has no room; return false where there is none. */
+static bool split(const Dexels *dexels, Ray *ray, int64_t k, RayEnd end, RayEnd begin) {
+    const int64_t filled = 2 * (int64_t)ray->filled, room = 2 * (int64_t)ray->room, used = AT(dexels->used, 0);
+    int64_t first = ray->first;
+    if (filled == room) {
+        if (ray->filled >= TD_MOST || used + 2 * room > dexels->ends.rows)
+            return false;
+        first = used;
+        AT(dexels->used, 0) = used + 2 * room;
+        ray->room *= 2;
+    }
+    for (int64_t j = filled - 1; j > 2 * k; j--)
+        AT(dexels->ends, first + j + 2) = AT(dexels->ends, ray->first + j);
+    for (int64_t j = 0; j <= 2 * k && first != ray->first; j++)
+        AT(dexels->ends, first + j) = AT(dexels->ends, ray->first + j);
+    AT(dexels->ends, first + 2 * k + 1) = end;
+    AT(dexels->ends, first + 2 * k + 2) = begin;
+    ray->first = (int32_t)first;
+    ray->filled++;
     return true;
 }
 
 /* Take what is covered out of a ray, and put a stamp on the ends that it gets; return false where it has no room. */
-static bool take(const Stock *stock, int64_t ray, const Hit *hit, int32_t stamp, double *longest) {
+static bool take(const Stock *stock, Ray *ray, const Hit *hit, int32_t stamp, double *longest) {
     const float low = (float)hit->at[0], high = (float)hit->at[1];
-    const int64_t count = AT(stock->of->filled, ray);
     int64_t left = 0;
-    float ends[2 * TD_MOST + 2];
-    int32_t facing[2 * TD_MOST + 2];
-    for (int64_t k = 0; k < count; k++) {
-        const float a = *end_at(stock, ray, 2 * k), b = *end_at(stock, ray, 2 * k + 1);
-        const int32_t at_a = *facing_at(stock, ray, 2 * k), at_b = *facing_at(stock, ray, 2 * k + 1);
-        const bool is_before = low - a > (float)THIN_MM, is_behind = b - high > (float)THIN_MM;
-        const float cut = (b < high ? b : high) - (a > low ? a : low);
-        if (!(cut > (float)THIN_MM)) {
-            ends[2 * left] = a;
-            ends[2 * left + 1] = b;
-            facing[2 * left] = at_a;
-            facing[2 * left++ + 1] = at_b;
-            continue;
+    for (int64_t k = 0; k < ray->filled; k++) {
+        RayEnd *a = end_at(stock, ray, 2 * k), *b = end_at(stock, ray, 2 * k + 1);
+        const bool is_before = low - a->at > (float)THIN_MM, is_behind = b->at - high > (float)THIN_MM;
+        const float cut = (b->at < high ? b->at : high) - (a->at > low ? a->at : low);
+        if (cut > (float)THIN_MM) {
+            *longest = greater(*longest, cut);
+            const RayEnd end = {low, is_before ? packed(hit->normal[0], stamp) : 0};
+            const RayEnd begin = {high, is_behind ? packed(hit->normal[1], stamp) : 0};
+            if (is_before && is_behind)
+                return split(stock->of, ray, k, end, begin);
+            if (is_before)
+                *b = end;
+            else if (is_behind)
+                *a = begin;
+            else
+                continue;
         }
-        *longest = greater(*longest, cut);
-        if (is_before) {
-            ends[2 * left] = a;
-            ends[2 * left + 1] = low;
-            facing[2 * left] = at_a;
-            facing[2 * left++ + 1] = packed(hit->normal[0], stamp);
+        if (left < k) {
+            *end_at(stock, ray, 2 * left) = *a;
+            *end_at(stock, ray, 2 * left + 1) = *b;
         }
-        if (is_behind) {
-            ends[2 * left] = high;
-            ends[2 * left + 1] = b;
-            facing[2 * left] = packed(hit->normal[1], stamp);
-            facing[2 * left++ + 1] = at_b;
-        }
+        left++;
     }
-    if (!has_room(stock->of, ray, left))
-        return false;
-    for (int64_t k = 0; k < 2 * left; k++) {
-        *end_at(stock, ray, k) = ends[k];
-        *facing_at(stock, ray, k) = facing[k];
-    }
-    AT(stock->of->filled, ray) = (int32_t)left;
+    ray->filled = (uint8_t)left;
     return true;
 }
 
@@ -497,10 +513,10 @@ static void bound_block(const Stock *stock, const Field *field, int64_t row, int
     float low = INFINITY, high = -INFINITY;
     for (int64_t i = row * SIDE; i < least((row + 1) * SIDE, field->rows); i++)
         for (int64_t j = column * SIDE; j < least((column + 1) * SIDE, field->columns); j++) {
-            const int64_t ray = field->first + i * field->columns + j, count = AT(stock->of->filled, ray);
-            if (count == 0)
+            const Ray *ray = ray_at(stock, field, i, j);
+            if (ray->filled == 0)
                 continue;
-            const float first = *end_at(stock, ray, 0), last = *end_at(stock, ray, 2 * count - 1);
+            const float first = end_at(stock, ray, 0)->at, last = end_at(stock, ray, 2 * ray->filled - 1)->at;
             low = first < low ? first : low;
             high = last > high ? last : high;
         }
@@ -510,12 +526,12 @@ static void bound_block(const Stock *stock, const Field *field, int64_t row, int
 }
 
 /* Return whether a ray has material where the body reaches; widen the bounds of it. */
-static bool is_reached(const Cut *cut, int64_t ray, double *low, double *high) {
+static bool is_reached(const Cut *cut, const Ray *ray, double *low, double *high) {
     const int axis = cut->field->axis;
     bool is = false;
-    for (int64_t k = 0; k < AT(cut->stock->of->filled, ray); k++) {
-        const double a = greater(*end_at(cut->stock, ray, 2 * k), cut->low[axis]);
-        const double b = lesser(*end_at(cut->stock, ray, 2 * k + 1), cut->high[axis]);
+    for (int64_t k = 0; k < ray->filled; k++) {
+        const double a = greater(end_at(cut->stock, ray, 2 * k)->at, cut->low[axis]);
+        const double b = lesser(end_at(cut->stock, ray, 2 * k + 1)->at, cut->high[axis]);
         if (b - a > THIN_MM) {
             *low = lesser(*low, a);
             *high = greater(*high, b);
@@ -540,7 +556,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
     high[field->axis] = -INFINITY;
     for (int64_t i = i0, at = 0; i < i1; i++)
         for (int64_t j = j0; j < j1; j++)
-            is_in[at++] = is_reached(cut, field->first + i * field->columns + j, &low[field->axis], &high[field->axis]);
+            is_in[at++] = is_reached(cut, ray_at(stock, field, i, j), &low[field->axis], &high[field->axis]);
     low[field->u] = middle_of(stock, field->u, j0);
     high[field->u] = middle_of(stock, field->u, j1 - 1);
     low[field->v] = middle_of(stock, field->v, i0);
@@ -553,7 +569,7 @@ static bool cut_block(const Cut *cut, int64_t row, int64_t column, const int64_t
                 continue;
             place[field->u] = middle_of(stock, field->u, j);
             place[field->v] = middle_of(stock, field->v, i);
-            const int64_t ray = field->first + i * field->columns + j;
+            Ray *ray = ray_at(stock, field, i, j);
             Hit hit;
             swept(cut, ray, place, &hit);
             if (hit.hits)
@@ -569,6 +585,7 @@ bool cut_out(const Stock *stock, const Body *body, const Step *step, double *rem
     cut.first = pose_at(step, 0.0);
     cut.middle = pose_at(step, 0.5);
     cut.last = pose_at(step, 1.0);
+    cut.turns = dot3(step->turn, step->turn) > 0.0;
     int64_t cells[3][2];
     for (int axis = 0; axis < 3; axis++) {
         double along[3] = {0.0, 0.0, 0.0};
@@ -580,6 +597,7 @@ bool cut_out(const Stock *stock, const Body *body, const Step *step, double *rem
     }
     for (int axis = 0; axis < 3; axis++) {
         cut.field = &stock->fields[axis];
+        look_along(&cut);
         const int64_t *u = cells[cut.field->u], *v = cells[cut.field->v];
         if (u[0] >= u[1] || v[0] >= v[1])
             continue;
@@ -599,29 +617,39 @@ static int64_t cell_of(const Stock *stock, int axis, double at) {
 
 double depth_at(const Stock *stock, const double *place, double near_mm) {
     double best = 0.0, nearest_square = INFINITY, beyond = -INFINITY; /* of the box */
+    double free = FREE_MM;
     int inside = 0;
     int64_t cell[3];
     for (int axis = 0; axis < 3; axis++) {
         const double low = stock->low[axis], size = stock->cell[axis] * (double)stock->cells[axis];
         beyond = greater(beyond, greater(low - place[axis], place[axis] - low - size));
         if (beyond > near_mm)
-            return -near_mm;
+            return -beyond;
         cell[axis] = cell_of(stock, axis, place[axis]);
     }
+    const Ray *rays[3];
     for (int axis = 0; axis < 3; axis++) {
         const Field *field = &stock->fields[axis];
-        const int64_t ray = field->first + cell[field->v] * field->columns + cell[field->u], count = AT(stock->of->filled, ray);
+        rays[axis] = ray_at(stock, field, cell[field->v], cell[field->u]);
+        __builtin_prefetch(rays[axis]); /* what it takes is to wait for memory */
+    }
+    for (int axis = 0; axis < 3; axis++)
+        __builtin_prefetch(end_at(stock, rays[axis], 0));
+    for (int axis = 0; axis < 3; axis++) {
+        const Field *field = &stock->fields[axis];
+        const Ray *ray = rays[axis];
         int64_t after = 0; /* the first end behind the place */
-        while (after < 2 * count && *end_at(stock, ray, after) <= (float)place[axis])
+        while (after < 2 * ray->filled && end_at(stock, ray, after)->at <= (float)place[axis])
             after++;
         inside += after % 2;
         double own = 0.0, own_square = INFINITY;
         for (int64_t end = after - 1; end <= after; end++) {
-            if (end < 0 || end >= 2 * count)
+            if (end < 0 || end >= 2 * ray->filled)
                 continue;
             double off[3], depth = 0.0;
-            off[axis] = place[axis] - *end_at(stock, ray, end);
-            const int32_t facing = *facing_at(stock, ray, end);
+            off[axis] = place[axis] - end_at(stock, ray, end)->at;
+            free = lesser(free, fabs(off[axis]));
+            const int32_t facing = end_at(stock, ray, end)->facing;
             const double steep = fabs(unpacked(facing, axis));
             if (fabs(off[axis]) * steep > 1.5 * near_mm)
                 continue;
@@ -642,7 +670,7 @@ double depth_at(const Stock *stock, const double *place, double near_mm) {
         }
     }
     if (nearest_square == INFINITY)
-        best = inside >= 2 ? near_mm : -near_mm;
+        best = (inside >= 2 ? 1.0 : -1.0) * greater(ROOM * free, near_mm);
     return beyond > 0.0 ? lesser(best, -beyond) : best;
 }
 
@@ -703,10 +731,10 @@ EXPORT void cutting_bodies_dexels(const Dexels *dexels, Floats ends_mm, Floats r
             CELL(place_mm, n, k) = NAN;
         for (int64_t i = v[0]; i < v[1]; i++)
             for (int64_t j = u[0]; j < u[1]; j++) {
-                const int64_t ray = i * field->columns + j + field->first;
+                const Ray *ray = ray_at(stock, field, i, j);
                 const double x = middle_of(stock, 0, j), y = middle_of(stock, 1, i);
-                for (int64_t k = 0; k < AT(stock->of->filled, ray); k++) {
-                    const double low = *end_at(stock, ray, 2 * k), high = *end_at(stock, ray, 2 * k + 1);
+                for (int64_t k = 0; k < ray->filled; k++) {
+                    const double low = end_at(stock, ray, 2 * k)->at, high = end_at(stock, ray, 2 * k + 1)->at;
                     if (high <= lesser(a[2], b[2]) - wide || low >= greater(a[2], b[2]) + wide)
                         continue;
                     const double stretch[6] = {x, y, low, x, y, high};
@@ -725,5 +753,5 @@ EXPORT void cutting_bodies_dexels(const Dexels *dexels, Floats ends_mm, Floats r
 EXPORT void cutting_depths(const Dexels *dexels, Floats places_mm, double near_mm, Floats depth_mm) {
     const Stock stock = stock_of(dexels);
     for (int64_t i = 0; i < places_mm.rows; i++)
-        AT(depth_mm, i) = depth_at(&stock, &CELL(places_mm, i, 0), near_mm);
+        AT(depth_mm, i) = clamped(depth_at(&stock, &CELL(places_mm, i, 0), near_mm), -near_mm, near_mm);
 }

@@ -30,10 +30,10 @@ typedef struct {
     int32_t stamp;
 } Step;
 
-/* Rays along an axis, columns along `u`, rows along `v`; the first of them and of their blocks. */
+/* Rays along an axis, columns along `u`, rows along `v`, in blocks; the first of their blocks. */
 typedef struct {
     int axis, u, v;
-    int64_t columns, rows, first, block_columns, first_block;
+    int64_t columns, rows, block_columns, first_block;
 } Field;
 
 /* Dexels with what is looked up for each ray: the three fields, the low corner, the size of a cell and their number. */
@@ -51,13 +51,15 @@ static inline double middle_of(const Stock *stock, int axis, int64_t cell) {
     return stock->low[axis] + ((double)cell + 0.5) * stock->cell[axis];
 }
 
-/* Return an end on a ray, and what is packed there. */
-static inline float *end_at(const Stock *stock, int64_t ray, int64_t k) {
-    return &AT(stock->of->ends, AT(stock->of->first, ray) + k);
+/* Return a ray of a field: those of a block are together, as what is read and cut is. */
+static inline Ray *ray_at(const Stock *stock, const Field *field, int64_t row, int64_t column) {
+    const uint64_t side = TD_SIDE, i = (uint64_t)row, j = (uint64_t)column;
+    const uint64_t block = (uint64_t)field->first_block + i / side * (uint64_t)field->block_columns + j / side;
+    return &AT(stock->of->rays, (block * side + i % side) * side + j % side);
 }
-static inline int32_t *facing_at(const Stock *stock, int64_t ray, int64_t k) {
-    return &AT(stock->of->facing, AT(stock->of->first, ray) + k);
-}
+
+/* Return an end on a ray. */
+static inline RayEnd *end_at(const Stock *stock, const Ray *ray, int64_t k) { return &AT(stock->of->ends, ray->first + k); }
 
 /* Return a coordinate of the normal at an end of a ray, and its stamp. */
 static inline double unpacked(int32_t facing, int k) {
@@ -84,7 +86,8 @@ double reach_of(const Body *body, const Pose *pose, const double *along);
    false where a ray has no room for another stretch: the step is then to be done again. */
 bool cut_out(const Stock *stock, const Body *body, const Step *step, double *removed_mm);
 
-/* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side. */
+/* Return how deep a place is in material, negative outside; beyond `near_mm` only on which side, and so deep that the rays there
+   leave room for a ball of that radius. */
 double depth_at(const Stock *stock, const double *place, double near_mm);
 
 /* Return a height that no material within a radius in plan is above. */

@@ -42,14 +42,14 @@ static uint8_t *solid_at(const Stock *stock, const Surface *surface, const int64
 }
 
 /* Return the ray along an axis through a middle, of which those in the stock are counted from 1. */
-static int64_t ray_of(const Stock *stock, int axis, const int64_t *middle) {
+static const Ray *ray_of(const Stock *stock, int axis, const int64_t *middle) {
     const Field *field = &stock->fields[axis];
-    return field->first + (middle[field->v] - 1) * field->columns + middle[field->u] - 1;
+    return ray_at(stock, field, middle[field->v] - 1, middle[field->u] - 1);
 }
 
-static bool has_at(const Stock *stock, int64_t ray, double place) {
-    for (int64_t k = 0; k < AT(stock->of->filled, ray); k++)
-        if (*end_at(stock, ray, 2 * k) <= place && place < *end_at(stock, ray, 2 * k + 1))
+static bool has_at(const Stock *stock, const Ray *ray, double place) {
+    for (int64_t k = 0; k < ray->filled; k++)
+        if (end_at(stock, ray, 2 * k)->at <= place && place < end_at(stock, ray, 2 * k + 1)->at)
             return true;
     return false;
 }
@@ -80,13 +80,14 @@ static End end_on(const Stock *stock, int axis, const int64_t *middle, bool is_s
         end.place[k] = middle_of(stock, k, middle[k] - 1);
     const double low = end.place[axis] - NEAR_CELLS * size, high = end.place[axis] + (1.0 + NEAR_CELLS) * size;
     end.place[axis] += 0.5 * size;
-    const int64_t ray = ray_of(stock, axis, middle);
-    for (int64_t k = is_solid; k < 2 * AT(stock->of->filled, ray); k += 2) {
-        if (*end_at(stock, ray, k) < low || *end_at(stock, ray, k) > high)
+    const Ray *ray = ray_of(stock, axis, middle);
+    for (int64_t k = is_solid; k < 2 * ray->filled; k += 2) {
+        const RayEnd *here = end_at(stock, ray, k);
+        if (here->at < low || here->at > high)
             continue;
-        end.place[axis] = *end_at(stock, ray, k);
-        end.facing = *facing_at(stock, ray, k);
-        end.stamp = stamp_of(*facing_at(stock, ray, k));
+        end.place[axis] = here->at;
+        end.facing = here->facing;
+        end.stamp = stamp_of(here->facing);
         for (int m = 0; m < 3; m++)
             end.normal[m] = unpacked(end.facing, m);
         break;
@@ -193,9 +194,9 @@ static void age_stamps(const Stock *stock, const Range *range) {
         const Field *field = &stock->fields[axis];
         for (int64_t v = most(range->first[field->v] - 1, 0); v < least(range->last[field->v] + 1, field->rows); v++)
             for (int64_t u = most(range->first[field->u] - 1, 0); u < least(range->last[field->u] + 1, field->columns); u++) {
-                const int64_t ray = field->first + v * field->columns + u;
-                for (int64_t k = 0; k < 2 * AT(stock->of->filled, ray); k++) {
-                    int32_t *facing = facing_at(stock, ray, k);
+                const Ray *ray = ray_at(stock, field, v, u);
+                for (int64_t k = 0; k < 2 * ray->filled; k++) {
+                    int32_t *facing = &end_at(stock, ray, k)->facing;
                     if (stamp_of(*facing) != OF_RAW)
                         *facing = with_stamp(*facing, OF_EARLIER);
                 }

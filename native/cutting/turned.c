@@ -16,7 +16,12 @@ poses. Each band of the edge has the chip of its own place on a rigid body that 
 #define SHORT 0.3            /* length of a stretch, in radii, whose middle need not be read where both ends are alike */
 #define SHARE_NEAR 0.05     /* of the force: what may lie beside the line between two nodes */
 
-enum { MOST_MET = 12, HALVINGS = 3, COLLISION_BINS = 32, NUMBERS = 6 };
+#define SHARE_ALIKE 0.05    /* by which the share of a bin may lie beside the line between two others */
+#define CROSSES 0.5         /* change of depth along a stretch, as a share of it, from which on its surface does not graze it */
+#define SEARCH_EDGE 0.1     /* of a stretch that is searched: so far from its ends it is read */
+
+/* Bins from one that is read in any case to the next, and those of which one in the middle may speak for all. */
+enum { MOST_MET = 12, SEARCHES = 3, FAR_BINS = 8, NEAR_BINS = 4, COLLISION_BINS = 32, NUMBERS = 6 };
 
 /* Along `$BASE`: force and moment about the tip of a tooth times rad, torque. */
 typedef struct {
@@ -221,11 +226,11 @@ static float depth_on(const Turning *turning, const Place *place, double radius,
     return (float)(depth - FEEL_OF_NEAR * turning->near_mm);
 }
 
-/* A band of the edge while it is read: depths on its rings, NaN where they are not read yet; its own feed, in bins
-   turned by an angle from those of the sample. */
+/* A band of the edge while it is read: depths on its rings, NaN where they are not read yet; shares of its bins that are engaged;
+   its own feed, in bins turned by an angle from those of the sample. */
 typedef struct {
     const Band *band;
-    float *lower, *upper;
+    float *lower, *upper, *share;
     double forward[3], across[3], sine, cosine;
     double swing, offset, least; /* its chip, swing·sin phi + offset, and the least there is, as shares of the sample's feed */
 } Edge;
@@ -269,15 +274,22 @@ static float ring_depth(const Turning *turning, const Place *place, const Edge *
     return *known;
 }
 
-/* Return the share of a band that is engaged in a bin: where the material ends between its rings is searched. */
+/* Return the share of a band that is engaged in a bin: where the material ends between its rings is searched, until the surface
+   is near on both sides and passes between them, or for so many times. */
 static double share_of(const Turning *turning, const Place *place, const Edge *edge, int64_t bin) {
     const Band *band = edge->band;
     const float first = ring_depth(turning, place, edge, false, bin), last = ring_depth(turning, place, edge, true, bin);
     if ((first > 0.0f) == (last > 0.0f))
         return first > 0.0f ? 1.0 : 0.0;
+    const double known_mm = (1.0 - 2.0 * FEEL_OF_NEAR) * turning->near_mm;
+    const double length_mm = hypot(band->high - band->low, band->r_high - band->r_low);
     double low = 0.0, high = 1.0, at_low = first, at_high = last;
-    for (int halving = 0; halving < HALVINGS; halving++) {
-        const double middle = 0.5 * (low + high);
+    for (int search = 0; search < SEARCHES; search++) {
+        const bool is_known = greater(fabs(at_low), fabs(at_high)) < known_mm;
+        if (is_known && fabs(at_low - at_high) > CROSSES * (high - low) * length_mm)
+            break;
+        const double share = is_known ? 0.5 : clamped(at_low / (at_low - at_high), SEARCH_EDGE, 1.0 - SEARCH_EDGE);
+        const double middle = low + share * (high - low);
         const double here = depth_on(turning, place, band->r_low + middle * (band->r_high - band->r_low),
                                      band->low + middle * (band->high - band->low), bin);
         if ((here > 0.0) == (first > 0.0f)) {
@@ -290,6 +302,46 @@ static double share_of(const Turning *turning, const Place *place, const Edge *e
     }
     const double border = low + (high - low) * at_low / (at_low - at_high);
     return first > 0.0f ? border : 1.0 - border;
+}
+
+/* Tell whether both bins have material on both rings of a band, or both none, and so far around that it is the same in between. */
+static bool is_plain(const Edge *edge, int64_t a, int64_t b, double apart_rad) {
+    const bool is_in = edge->lower[a] > 0.0f;
+    return is_in == (edge->upper[a] > 0.0f) && is_in == (edge->lower[b] > 0.0f) && is_in == (edge->upper[b] > 0.0f) &&
+           fabs(edge->lower[a]) + fabs(edge->lower[b]) > apart_rad * edge->band->r_low &&
+           fabs(edge->upper[a]) + fabs(edge->upper[b]) > apart_rad * edge->band->r_high;
+}
+
+/* Write the shares of the bins between two that are read: in the middle it is read, and so on by halves, until what lies around
+   leaves no other, or a near one in the middle lies between its neighbours. */
+static void fill_shares(const Turning *turning, const Place *place, const Edge *edge, int64_t a, int64_t b) {
+    if (b - a < 2)
+        return;
+    float *share = edge->share;
+    const int64_t bins = AT(turning->cutters->ring_bins, place->tool), middle = (a + b) / 2;
+    bool is_even = is_plain(edge, a, b, (double)(b - a) * TURN / (double)bins);
+    if (!is_even) {
+        share[middle] = (float)share_of(turning, place, edge, middle);
+        const bool is_engaged = share[a] > 0.0f && share[middle] > 0.0f && share[b] > 0.0f;
+        is_even = b - a <= NEAR_BINS && is_engaged && fabs(share[middle] - 0.5 * (share[a] + share[b])) < SHARE_ALIKE;
+    }
+    if (!is_even) {
+        fill_shares(turning, place, edge, a, middle);
+        fill_shares(turning, place, edge, middle, b);
+        return;
+    }
+    for (int64_t j = a + 1; j < b; j++)
+        share[j] = share[a] + (share[b] - share[a]) * (float)(j - a) / (float)(b - a);
+}
+
+/* Write the shares of a run of bins. */
+static void read_shares(const Turning *turning, const Place *place, const Edge *edge, int64_t first, int64_t after) {
+    edge->share[first] = (float)share_of(turning, place, edge, first);
+    for (int64_t at = first, next; at + 1 < after; at = next) {
+        next = least(at + FAR_BINS, after - 1);
+        edge->share[next] = (float)share_of(turning, place, edge, next);
+        fill_shares(turning, place, edge, at, next);
+    }
 }
 
 static void add_along(const Force *part, double width, double height, double radius, const Edge *edge,
@@ -316,6 +368,12 @@ static Integrals turned_by(const Integrals *bins, double sine, double cosine) {
                        .sin_cos = bins->sin_cos * (cosine * cosine - sine * sine) + (cos_cos - bins->sin_sin) * both};
 }
 
+/* Tell whether an edge moves towards material in a bin. */
+static bool cuts(const Turning *turning, const Edge *edge, int64_t bin) {
+    const double sine = CELL(turning->work->turn, RING_SIN, bin), cosine = CELL(turning->work->turn, RING_COS, bin);
+    return (sine * edge->cosine + cosine * edge->sine) * edge->swing + edge->offset > edge->least;
+}
+
 /* Add the force of a band; mark the bins in which it is engaged. */
 static void add_edge(const Turning *turning, const Place *place, Edge *edge, Contact *contact, double *most_mm,
                      double *least_mm) {
@@ -328,14 +386,20 @@ static void add_edge(const Turning *turning, const Place *place, Edge *edge, Con
     Integrals sums = {0.0, 0.0, 0.0, 0.0, 0.0};
     Parts parts = {{0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}};
     double engaged = 0.0;
+    for (int64_t j = 0, end; j < bins; j = end) {
+        const bool is_in = cuts(turning, edge, j);
+        for (end = j + 1; end < bins && cuts(turning, edge, end) == is_in;)
+            end++;
+        if (is_in)
+            read_shares(turning, place, edge, j, end);
+        for (int64_t k = j; k < end && !is_in; k++)
+            edge->share[k] = 0.0f;
+    }
     for (int64_t j = 0; j < bins; j++) {
-        const double sine = CELL(turn, RING_SIN, j), cosine = CELL(turn, RING_COS, j);
-        if (!((sine * edge->cosine + cosine * edge->sine) * edge->swing + edge->offset > edge->least))
-            continue;
-        const double share = share_of(turning, place, edge, j);
+        const double share = edge->share[j], cosine = CELL(turn, RING_COS, j);
         if (!(share > 0.0))
             continue;
-        const double top = ring_depth(turning, place, edge, true, j) > 0.0f ? 1.0 : share;
+        const double top = edge->upper[j] > 0.0f ? 1.0 : share;
         engaged += share;
         contact->a_p_mm = greater(contact->a_p_mm, band->low + top * (band->high - band->low));
         *most_mm = greater(*most_mm, band->r_high * cosine);
@@ -405,7 +469,8 @@ static Contact read_contact(const Turning *turning, int64_t i, int64_t cut) {
     const double up = 0.5 * place.body->top;
     const double highest = highest_near(turning->stock, tip[0] + up * axis[0], tip[1] + up * axis[1],
                                         place.body->radius + up * flat); /* beside all of the edge */
-    Edge edge = {.lower = &CELL(turning->work->rows, LOWER, 0), .upper = &CELL(turning->work->rows, UPPER, 0)};
+    Edge edge = {.lower = &CELL(turning->work->rows, LOWER, 0), .upper = &CELL(turning->work->rows, UPPER, 0),
+                 .share = &CELL(turning->work->rows, SHARE, 0)};
     for (int64_t j = 0; j < bins; j++)
         CELL(turning->work->reach, 0, j) = 0.0f;
     forget(edge.upper, bins);

@@ -117,7 +117,7 @@ def test_how_many_points_come_at_a_time_changes_nothing():
         for a, b in pairwise(borders)
     ]
     np.testing.assert_array_equal(np.concatenate(parts), whole.force_N)
-    for name in ("ends", "filled"):
+    for name in ("ends", "rays"):
         np.testing.assert_array_equal(getattr(engagement.dexels, name), getattr(left, name))
 
 
