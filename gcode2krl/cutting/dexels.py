@@ -93,29 +93,47 @@ class Dexels(NamedTuple):
 
     def stretches(self) -> tuple[Ints, Floats]:
         """Return the ray (s,) of each stretch of material, rising, and both its ends (s, 2) in mm."""
-        ray = np.repeat(np.arange(len(self.filled)), self.filled)
-        after = np.cumsum(self.filled)
-        begin = self.first[ray] + 2 * (np.arange(len(ray)) - (after - self.filled)[ray])
-        return ray, self.ends[begin[:, None] + [0, 1]].astype(np.float64)
+        filled = self.rays["filled"].astype(np.int64)
+        ray = np.repeat(np.arange(len(filled)), filled)
+        number = np.arange(len(ray)) - np.repeat(np.cumsum(filled) - filled, filled)
+        begin = self.rays["first"][ray] + 2 * number
+        return ray, self.ends["at"][begin[:, None] + [0, 1]].astype(np.float64)
+
+    def places(self, ray: Ints) -> tuple[Ints, Ints, Ints]:
+        """Return axis, row and column (r,) of rays, as `_ray` numbers them."""
+        firsts = _firsts(self.cells)
+        axis = np.searchsorted(firsts, ray, side="right") - 1
+        block, inside = np.divmod(ray - firsts[axis], SIDE**2)
+        blocks_in_a_row = -(-self.cells[(axis + 1) % 3] // SIDE)
+        row = SIDE * (block // blocks_in_a_row) + inside // SIDE
+        return axis, row, SIDE * (block % blocks_in_a_row) + inside % SIDE
 
     def coarser(self, cell_mm: float) -> "Dexels":
         """Return the same material on fewer rays, each as the nearest of these."""
         low_mm, size_mm, cells = _grid(
             np.array([self.low_mm, self.low_mm + self.cells * self.cell_mm]), cell_mm
         )
-        firsts, rays = _firsts(self.cells), []
+        firsts, own_firsts = _firsts(cells), _firsts(self.cells)
+        near = np.full(firsts[3], -1)  # rays of a block beyond the field are none
         for axis in range(3):
-            column, row = (
-                ((np.arange(cells[k]) + 0.5) * size_mm[k] / self.cell_mm[k]).astype(np.int64)
-                for k in ((axis + 1) % 3, (axis + 2) % 3)
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            row, column = np.divmod(np.arange(cells[u] * cells[v]), cells[u])
+            own_row, own_column = (
+                ((at + 0.5) * size_mm[k] / self.cell_mm[k]).astype(np.int64)
+                for at, k in ((row, v), (column, u))
             )
-            rays.append((firsts[axis] + row[:, None] * self.cells[(axis + 1) % 3] + column).ravel())
-        ray = np.concatenate(rays)
-        made = _with_ends(low_mm, size_mm, cells, self.filled[ray].astype(np.int64))
-        ends = 2 * made.filled.astype(np.int64)
+            own = own_firsts[axis] + _ray(own_row, own_column, self.cells[u])
+            near[firsts[axis] + _ray(row, column, cells[u])] = own
+        filled = np.where(near >= 0, self.rays["filled"][near], 0).astype(np.int64)
+        made = _with_ends(low_mm, size_mm, cells, filled)
+        ends = 2 * filled
         number = np.arange(ends.sum()) - np.repeat(np.cumsum(ends) - ends, ends)
-        to, of = (np.repeat(first.astype(np.int64), ends) + number for first in (made.first, self.first[ray]))
-        made.ends[to], made.facing[to] = self.ends[of], self.facing[of] & 0xFFFFFF  # without a stamp
+        to, of = (
+            np.repeat(first.astype(np.int64), ends) + number
+            for first in (made.rays["first"], self.rays["first"][near])
+        )
+        made.ends[to] = self.ends[of]
+        made.ends["facing"][to] &= 0xFFFFFF  # without a stamp
         _bound(made)
         return made
 

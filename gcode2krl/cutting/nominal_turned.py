@@ -122,11 +122,7 @@ def _stretches(dexels: Dexels, wanted: "trimesh.Trimesh") -> _Stretches:
     has, wants = (np.cumsum(step[order]) > 0 for step in steps)
     is_cut = steps[0][order] != 0
     k = np.flatnonzero((ray[1:] == ray[:-1]) & (has != wants)[:-1] & (np.diff(at) > TOLERANCE_MM))
-    first = np.cumsum(
-        [0, *(dexels.cells[(axis + 1) % 3] * dexels.cells[(axis + 2) % 3] for axis in range(3))]
-    )
-    axis = np.searchsorted(first, ray[k], side="right") - 1
-    row, column = np.divmod(ray[k] - first[axis], dexels.cells[(axis + 1) % 3])
+    axis, row, column = dexels.places(ray[k])
     span_mm = np.stack([at[k], at[k + 1]], axis=1)
     place_mm, every = np.empty((len(k), 3, 3)), np.arange(len(k))
     place_mm[every, :, axis] = np.column_stack([span_mm, span_mm.mean(axis=1)])
