@@ -130,6 +130,8 @@ class Effect:
     """Of what it is a function; with ``where`` its family. Empty: not stated."""
     feels_weight: bool = False
     """Its size depends on weight and inertia of the links, as far as the cell states their masses."""
+    of_set_up: Literal["", "frame", "small"] = ""
+    """What a set-up leaves off: the part's frame as a whole, or a little of each joint and tool beside it."""
     is_nuisance: bool = False
     """Its usual size is at work in every run, the same in all, and a fit allows for it: see `disturbed`.
 

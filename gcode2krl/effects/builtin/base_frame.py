@@ -15,6 +15,7 @@ class BaseFrame(Effect):
     links = frozenset({"mechanics"})
     where = frozenset({Where.TIP})
     depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
+    of_set_up = "frame"
     parameters = frame_parameters(
         most_mm=20.0,
         most_deg=2.0,

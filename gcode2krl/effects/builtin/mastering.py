@@ -18,6 +18,7 @@ class Mastering(Effect):
     links = frozenset({"mechanics"})
     where = frozenset({Where.JOINT})
     depends_on = frozenset({Dependence.CONSTANT})
+    of_set_up = "small"
     targets = staticmethod(every_joint)
     parameters = (
         Parameter(

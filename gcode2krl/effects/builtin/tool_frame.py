@@ -18,6 +18,7 @@ class ToolFrame(Effect):
     links = frozenset({"mechanics"})
     where = frozenset({Where.TIP})
     depends_on = frozenset({Dependence.CONSTANT, Dependence.PLACE})
+    of_set_up = "small"
     parameters = frame_parameters(
         most_mm=20.0,
         most_deg=2.0,

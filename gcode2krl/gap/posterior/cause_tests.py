@@ -333,8 +333,6 @@ def covariance_of(likelihood: Likelihood, fitted: Fitted) -> Floats:
 
 
 _PRIOR = THRESHOLDS.posterior.prior_sizes
-_SMALL_ERRORS = frozenset({"base_frame", "tool_frame", "mastering"})
-"""What is off by a little on every arm as it is set up; of these many may be, and none shows for itself."""
 _MOVED = 1e-3
 """Of the power in the component that a cause moves most: one with less is not moved."""
 
@@ -550,7 +548,7 @@ class LinkFamilies:
         if applied.effect.family == "geometry":
             least_form = 1.0 - _LIMITS.model_error**2
             is_nearly = form >= (1.0 - _LIMITS.small_errors) * (form + own_rest)
-            if applied.effect.name == "base_frame" and is_nearly:  # seldom the only small error of a set-up
+            if applied.effect.of_set_up == "frame" and is_nearly:  # seldom the only small error of a set-up
                 left = self._beside_small_errors.evidences
                 own_rest = max((net_gain(each) for each in left if _is_of(applied, each)), default=0.0)
         return FamilyTests(
@@ -566,13 +564,13 @@ class LinkFamilies:
 
     @cached_property
     def _beside_small_errors(self) -> Study:
-        """What families say beside the accepted effects and small errors of frames and mastering."""
+        """What families say beside the accepted effects and small errors of the set-up."""
         applied, traces = self._found.applied, self._rows.traces
         taken = {each.key for each in applied}
         small = [
             setting
             for block in self._found.question.blocks
-            if block.effect.name in _SMALL_ERRORS and block.key not in taken
+            if block.effect.of_set_up == "small" and block.key not in taken
             for setting in block.settings(traces[0])
         ]
         columns = []
