@@ -93,7 +93,9 @@ class Dexels(NamedTuple):
 
     def stretches(self) -> tuple[Ints, Floats]:
         """Return the ray (s,) of each stretch of material, rising, and both its ends (s, 2) in mm."""
-        filled = self.rays["filled"].astype(np.int64)
+        axis, row, column = self.places(np.arange(len(self.rays)))
+        is_inside = (row < self.cells[(axis + 2) % 3]) & (column < self.cells[(axis + 1) % 3])
+        filled = np.where(is_inside, self.rays["filled"], 0).astype(np.int64)  # blocks reach beyond the field
         ray = np.repeat(np.arange(len(filled)), filled)
         number = np.arange(len(ray)) - np.repeat(np.cumsum(filled) - filled, filled)
         begin = self.rays["first"][ray] + 2 * number

@@ -9,7 +9,7 @@ from gcode2krl import plan_motion, read_gcode
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cli.nominal import _nearest_on
 from gcode2krl.cutting import remove
-from gcode2krl.cutting.dexels import Dexels
+from gcode2krl.cutting.dexels import Dexels, dexel_block
 from gcode2krl.cutting.nominal import TOLERANCE_MM
 from gcode2krl.cutting.nominal_turned import compare_turned
 from gcode2krl.cutting.solids import mesh_of, solid_of
@@ -172,3 +172,19 @@ def test_less_than_the_tolerance_is_none(cut):
     for change_mm, count in ((near, 0), (2.0 * near, 1)):
         nominal = wanted() - astray() - block([-1, 40.0 - change_mm, -21], [61, 41, 1])
         assert len(compared(cut, nominal).differences) == count
+
+
+@pytest.mark.parametrize("cells", [(8, 8, 8), (9, 10, 11), (5, 4, 7)])
+def test_a_block_has_one_stretch_on_each_ray_of_its_fields(cells):
+    """Rays lie in blocks of 4 x 4, which reach beyond a field whose cells are no multiple of that."""
+    size_mm = np.array(cells, dtype=float)
+    block = dexel_block(np.array([[0.0, 0.0, 0.0], size_mm]), 1.0)
+    ray, ends_mm = block.stretches()
+    axis, row, column = block.places(ray)
+    assert len(ray) == cells[0] * cells[1] + cells[1] * cells[2] + cells[2] * cells[0]
+    for k in range(3):
+        mine = axis == k
+        np.testing.assert_allclose(ends_mm[mine], [[0.0, size_mm[k]]] * mine.sum())
+        assert row[mine].max() == cells[(k + 2) % 3] - 1
+        assert column[mine].max() == cells[(k + 1) % 3] - 1
+    assert block.volume_mm3 == pytest.approx(np.prod(size_mm))
