@@ -532,23 +532,25 @@ def _may_follow(examination: Examination, cause: Cause) -> bool:
     if any(each.place.name == cause.applied.target for each in families):
         return True
     others = examination.without(examination.applied.index(cause.applied))
-    inputs, moved = [], []
+    gaps, moved = [], []
     for trace in examination.traces:
-        before = [
-            np.stack([np.interp(trace.time_s, each.time_s, column) for column in rest.T], axis=1)
-            for judged in unnamed
-            for each in judged.every
-            if each.run_number == trace.run_number
-            for rest in (each.measured - judged.fitted(each, each.time_s),)
-        ]
-        if before:
-            columns = np.concatenate(before, axis=1)
-            inputs.append(columns - columns.mean(axis=0))
+        of_run = [_unexplained_at(trace, judged) for judged in unnamed]
+        if all(gap is not None for gap in of_run):
+            columns = np.concatenate([gap for gap in of_run if gap is not None], axis=1)
+            gaps.append(columns - columns.mean(axis=0))  # an encoder's offset is no gap
             moved.append(trace.sample(examination.applied) - trace.sample(others))
-    widths = {each.shape[1] for each in inputs}
-    if len(widths) != 1:
-        return True
-    return share_told(np.concatenate(inputs), np.concatenate(moved)) > _LIMITS.follows_share
+    if not gaps or len({columns.shape[1] for columns in gaps}) > 1:
+        return True  # runs that measured other joints cannot be asked together
+    return share_told(np.concatenate(gaps), np.concatenate(moved)) > _LIMITS.follows_share
+
+
+def _unexplained_at(trace: Trace, judged: Judgement) -> Floats | None:
+    """Return what a judged link leaves of a trace's run, at its stamps: (n, k); None without that run."""
+    measured = next((other for other in judged.every if other.run_number == trace.run_number), None)
+    if measured is None:
+        return None
+    gap = measured.measured - judged.fitted(measured, measured.time_s)
+    return np.stack([np.interp(trace.time_s, measured.time_s, column) for column in gap.T], axis=1)
 
 
 def share_told(columns: Floats, signal: Floats) -> float:

@@ -251,7 +251,7 @@ class Likelihood:
     def put_away(self) -> "Likelihood":
         """Return the likelihood of a link that is judged: its large columns are made again if asked for."""
         other = copy(self)
-        del other.whitened_nuisance
+        other.__dict__.pop("whitened_nuisance", None)  # what `cached_property` keeps, if it is there
         return other
 
     def counting(self, once: CountedOnce) -> "Likelihood":
