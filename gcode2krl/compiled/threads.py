@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 _END: Any = object()
+HELPER = "gcode2krl-helper"
+"""Name of the threads that stay for the next work."""
+_MOST_HELPERS = 256
+"""More than are ever asked for at once: three stages with one a core."""
 
 
 THREADS_VARIABLE = "GCODE2KRL_THREADS"
@@ -36,14 +41,41 @@ def usable_cores() -> int:
 def in_threads(
     work: Callable[[Task], Result], tasks: Sequence[Task], threads: int | None = None
 ) -> list[Result]:
-    """Return ``work(task)`` of each task, in their order; ``threads`` is by default one a core."""
+    """Return ``work(task)`` of each task, in their order; ``threads`` is by default one a core.
+
+    The caller works too, so work may be divided again, and raises what the first task that fails raises.
+    """
     workers = min(len(tasks), threads or cores())
     if workers < 2:
         return [work(task) for task in tasks]
+    waiting = iter(enumerate(tasks))  # shared: no two threads get the same item of it
+    results: dict[int, Result] = {}
+    errors: dict[int, BaseException] = {}
+
+    def work_on() -> None:
+        for k, task in waiting:
+            try:
+                results[k] = work(task)
+            except BaseException as error:
+                errors[k] = error
+                list(waiting)  # nothing more is begun
+
+    helpers = [_helpers().submit(work_on) for _ in range(workers - 1)]
+    work_on()
+    for helper in helpers:
+        if not helper.cancel():  # one that has not begun finds nothing left to do
+            helper.result()
+    if errors:
+        raise errors[min(errors)]
+    return [results[k] for k in range(len(tasks))]
+
+
+@cache
+def _helpers() -> "ThreadPoolExecutor":
+    """Return threads that stay once they are started: starting one takes as long as a small task."""
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(work, tasks))
+    return ThreadPoolExecutor(_MOST_HELPERS, thread_name_prefix=HELPER)
 
 
 @contextmanager

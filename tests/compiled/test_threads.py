@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from gcode2krl import read_gcode
-from gcode2krl.compiled.threads import THREADS_VARIABLE, ahead, cores, in_threads
+from gcode2krl.compiled.threads import HELPER, THREADS_VARIABLE, ahead, cores, in_threads
 from gcode2krl.errors import NotUnderstoodError
 
 
@@ -29,12 +29,34 @@ def test_one_thread_is_the_callers():
     assert set(in_threads(lambda task: threading.get_ident(), range(5), 1)) == {threading.get_ident()}
 
 
-def test_an_error_comes_out():
+def test_the_error_of_the_first_task_that_fails_comes_out():
+    both, begun = threading.Barrier(2, timeout=10.0), []
+
     def fails(task):
+        begun.append(task)
+        both.wait()
+        time.sleep(0.02 if task == 0 else 0.0)  # the second fails before the first
         raise KeyError(task)
 
-    with pytest.raises(KeyError):
-        in_threads(fails, range(3), 2)
+    with pytest.raises(KeyError, match="0"):
+        in_threads(fails, range(6), 2)
+    assert sorted(begun) == [0, 1]
+
+
+def test_divided_work_may_be_divided_again():
+    """More threads asked for than there may ever be: whoever asks works too, so nobody waits for a thread."""
+
+    def divided(depth):
+        return 1 if depth == 0 else sum(in_threads(divided, [depth - 1] * 4, 4))
+
+    assert divided(3) == 4**3
+
+
+def test_threads_are_kept_for_the_next_work():
+    before = threading.active_count()
+    for _ in range(200):
+        in_threads(str, range(2), 2)
+    assert threading.active_count() < before + 20
 
 
 def test_no_tasks_no_results():
@@ -53,6 +75,10 @@ def test_a_worker_of_a_pool_takes_one(monkeypatch):
     monkeypatch.delenv(THREADS_VARIABLE, raising=False)
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert pool.submit(cores).result() == 1
+
+
+def threads_but_helpers():
+    return sum(not thread.name.startswith(HELPER) for thread in threading.enumerate())
 
 
 def counted(most, closed=None):
@@ -98,7 +124,7 @@ def test_an_error_while_making_an_item_comes_where_it_is_due():
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_no_thread_is_left_where_the_work_on_an_item_fails(error, threads):
-    before, closed = threading.active_count(), threading.Event()
+    before, closed = threads_but_helpers(), threading.Event()
 
     def twice():
         with ahead(counted(9, closed), threads) as items:
@@ -112,14 +138,14 @@ def test_no_thread_is_left_where_the_work_on_an_item_fails(error, threads):
     with pytest.raises(error):
         work_that_fails()
     assert closed.is_set()
-    assert threading.active_count() == before
+    assert threads_but_helpers() == before
 
 
 def test_a_refused_program_leaves_no_thread_to_the_garbage_collector(tmp_path):
     """One that waits for a thread may do so where Python holds the lock that the thread's end takes."""
     (tmp_path / "part.nc").write_text("BEGIN PGM 1 MM\nL X+10\n")
-    before = threading.active_count()
+    before = threads_but_helpers()
     with pytest.raises(NotUnderstoodError) as refused:
         read_gcode(tmp_path / "part.nc")
-    assert threading.active_count() == before
+    assert threads_but_helpers() == before
     del refused
