@@ -5,7 +5,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ _PAYLOAD = re.compile(r"\bKR\s*(\d+)")
 KINDS = ("robots", "controllers", "tools", "materials", "cells")
 
 
+@cache
 def models_folder() -> Path:
     """Return the folder ``models/``: inside the installed package, else beside it in a checkout."""
     package = Path(__file__).resolve().parents[1]

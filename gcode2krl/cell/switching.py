@@ -57,7 +57,10 @@ def rendered_widely(templates: Mapping[str, str], view: Mapping[str, Any]) -> di
     ]
     others += [{"rpm": rpm} for rpm in _OTHER_SPEEDS]
     for other in others:
-        for key, text in rendered(templates, {**view, **other}).items():
+        named = {  # what does not name the word says the same again
+            key: text for key, text in templates.items() if not other or any(word in text for word in other)
+        }
+        for key, text in rendered(named, {**view, **other}).items():
             texts.setdefault(key, []).append(text)
     return texts
 

@@ -203,7 +203,7 @@ def command(
 
 def _require_outputs(folder: Path, part_mesh: str | None, inputs: list[Path]) -> None:
     """Raise where an output is an input, has no folder, or its folder has foreign files."""
-    from gcode2krl.prediction import RECORD, refuse_foreign
+    from gcode2krl.prediction.folder import RECORD, refuse_foreign
     from gcode2krl.prediction.plots import FIGURES
 
     refuse_foreign(folder)

@@ -22,7 +22,6 @@ from gcode2krl.gcode.dialects import DEFAULT, REASON_CORNER, Dialect, dialect_of
 from gcode2krl.gcode.issues import found_issues, lines_to_quote, program_issues
 from gcode2krl.gcode.origin import control_of, refuse_foreign
 from gcode2krl.gcode.other_control import doubts_of_control, with_other_control
-from gcode2krl.gcode.program import HandsOver, Program
 from gcode2krl.gcode.program_tables import FRAMES
 from gcode2krl.gcode.reporting import COUNTS, EVENT, FOUND
 from gcode2krl.gcode.rotary import in_part
@@ -85,6 +84,7 @@ def chord_tolerance_issues(chord_tolerance_mm: float, source: str) -> Iterator[I
 
 if TYPE_CHECKING:  # a cell file costs its library a noticeable start
     from gcode2krl.cell import Cell
+    from gcode2krl.gcode.program import Program
 
 CHORD_TOLERANCE_MM = 0.01
 _ROOM = 1.25
@@ -443,6 +443,8 @@ class _Interpreter:
 
     def run_whole(self, text: bytes, first_line: int, begin: int, folders: Sequence[Path]) -> None:
         """Run the rest of a program from the line ``begin`` on, the first that computes or jumps."""
+        from gcode2krl.gcode.program import HandsOver, Program  # few programs need its patterns
+
         program = Program(self.name, self.spoken, folders, block_delete=bool(self.machine.block_delete))
         program.add(self.name, text, first_line, len(self.messages))
         program.start_at(begin)

@@ -19,14 +19,6 @@ from gcode2krl.exchange.html import beside, block, path_picture, text_table
 from gcode2krl.exchange.views import view
 from gcode2krl.files import Content, make_folder, refuse_inputs, write_together
 from gcode2krl.files.program_names import DIALECT_NAMES
-from gcode2krl.prediction.folder import (
-    RECORD,
-    UNFINISHED,
-    read_folder,
-    record_bytes,
-    refuse_foreign,
-    table_files,
-)
 from gcode2krl.prediction.forecast import LoadFigures, load_figures
 from gcode2krl.prediction.plots import Plots
 from gcode2krl.result import cell_of, record_of, sha256_of
@@ -358,6 +350,8 @@ class Prediction:
         >>> [file.name for file in predict("part.nc").save("saved")]
         ['toolpath.parquet', 'targets.parquet', 'motion.parquet', 'prediction.toml']
         """
+        from gcode2krl.prediction.folder import RECORD, UNFINISHED, refuse_foreign, table_files
+
         place = Path(folder)
         refuse_foreign(place)
         make_folder(place)
@@ -387,6 +381,8 @@ class Prediction:
         >>> Prediction.load("prediction").motion
         Motion(... samples, ... s)
         """
+        from gcode2krl.prediction.folder import read_folder
+
         return cls(**read_folder(Path(folder)))
 
     def _tables_on_disk(self) -> dict[str, ColumnFrame]:
@@ -405,6 +401,8 @@ class Prediction:
         return {name: ColumnFrame(columns) for name, columns in tables.items()}
 
     def _record_bytes(self, hashes: Mapping[str, str]) -> bytes:
+        from gcode2krl.prediction.folder import record_bytes
+
         head = head_of(self.inputs, self.issues, self.cell, self._figures().as_dict(), hashes)
         return record_bytes(
             self.inputs,

@@ -175,7 +175,7 @@ def _stock_elsewhere(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Is
     if box is None or not len(rows):
         return
     radius_mm = max((tool.diameter_mm for tool in cell.tool.values()), default=0.0) / 2.0
-    places = toolpath.position_mm[np.union1d(rows, rows - 1)][:, :2]
+    places = toolpath.position_mm[np.append(rows, rows - 1)][:, :2]
     low, high = places.min(axis=0) - radius_mm, places.max(axis=0) + radius_mm
     beside_mm = np.maximum(low - box[1][:2], box[0][:2] - high)
     if (beside_mm > (box[1] - box[0])[:2]).any():
