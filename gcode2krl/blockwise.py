@@ -44,6 +44,8 @@ class Planned:
     outlook: Callable[[], cutting.Outlook]
     """Raises `RefusedError` where the motion cannot be cut out of one field."""
     kept: "Kept | None"
+    follower: robot.Follower | None
+    """What knows the joints of the samples, where they were needed and are not kept."""
 
     def samples(self) -> "Kept":
         """Return the samples of a motion that was planned to keep them."""
@@ -103,7 +105,7 @@ def plan_course(
     kept = seen.kept
     if kept is not None:
         kept = kept._replace(motion=replace(kept.motion, issues=tuple(issues)))
-    return Planned(course, tuple(issues), seen.watch.outlook, kept)
+    return Planned(course, tuple(issues), seen.watch.outlook, kept, None if keeps else seen.follower)
 
 
 class _Seen(NamedTuple):
@@ -116,6 +118,7 @@ class _Seen(NamedTuple):
     contacts: tuple[Issue, ...]
     """Collisions, and what comes near; see `collision`."""
     kept: Kept | None
+    follower: robot.Follower | None
 
 
 class _Judges(NamedTuple):
@@ -134,7 +137,9 @@ def _seen_along(
     judges_joints = judges.joints and cell.robot.speeds.qd_deg_s is not None and course.moves > 0
     watches = judges.collisions and course.moves > 0
     guard = _Guard.over(targets, cell, line, keeps=keeps) if watches else None
-    follower = follower_of(course, cell) if judges_joints or guard is not None else None
+    follower = None
+    if judges_joints or guard is not None:
+        follower = follower_of(course, cell, remembers=0 if keeps else course.count)
     share = np.zeros(len(line)) if judges_joints else None
     gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
     carried = np.zeros((0, 6))
@@ -165,7 +170,8 @@ def _seen_along(
     contacts = guard.watch.issues() if guard is not None else ()
     if share is not None:
         share[moves_watched_at_targets(targets)] = 0.0  # a PTP keeps to the joint speeds by itself
-    return _Seen(share[chain.move] if share is not None else None, acceleration, watch, contacts, kept)
+    by_move = share[chain.move] if share is not None else None
+    return _Seen(by_move, acceleration, watch, contacts, kept, follower)
 
 
 class _Guard:
@@ -206,10 +212,10 @@ class _Guard:
         )
 
 
-def follower_of(course: krc4.Course, cell: Cell) -> robot.Follower:
-    """Return what solves the joints along a motion."""
+def follower_of(course: krc4.Course, cell: Cell, *, remembers: int = 0) -> robot.Follower:
+    """Return what solves the joints along a motion, see `robot.Follower`."""
     rows = robot.trial_rows(course.count)
-    return robot.Follower(course.at(rows), rows, course.dt_s, cell)
+    return robot.Follower(course.at(rows), rows, course.dt_s, cell, remembers=remembers)
 
 
 def _line_of_move(targets: Targets, chain: krc4.Chain) -> Ints32:
@@ -399,9 +405,10 @@ class PilotSamples:
         return replace(force, deflection_mm=np.broadcast_to(np.nan, force.deflection_mm.shape))
 
 
-def blocks_with_joints(course: krc4.Course, cell: Cell) -> Iterator[Samples]:
+def blocks_with_joints(planned: Planned, cell: Cell) -> Iterator[Samples]:
     """Yield the blocks of a motion with the joints and speeds that are known so far, see `Loads.along`."""
-    follower = follower_of(course, cell)
+    course, known = planned.course, planned.follower
+    follower = known.again() if known is not None else follower_of(course, cell)
     for motion, ends in course.blocks():
         yield motion, *follower.take(motion, ends), ends
 

@@ -213,14 +213,17 @@ def _inputs(plan: Plan, dt_s: float, settings: dict[str, Any]) -> dict[str, Any]
 
 
 def foresee(plan: Plan, *, forces: bool = True, begin: Begin = unseen) -> Forecast:
-    """Return what a program needs of a plan's prediction at the controller's cycle; no sample is kept."""
+    """Return what a program needs of a plan's prediction at the controller's cycle.
+
+    Of the samples no more is kept than the joints, until they are cut.
+    """
     begin("motion and joints")
     run = PlannedMotion(plan, plan.cell.controller.cycle_s, keeps=False)
     course, figures = run.motion.course, LargestLoads()
     samples = PilotSamples(plan.cell, course.count)
     if forces:
         tell = begin("material, forces, deflection")
-        with closing(run.blocks(blocks_with_joints(course, plan.cell), tell, has_peaks=False)) as blocks:
+        with closing(run.blocks(blocks_with_joints(run.motion, plan.cell), tell, has_peaks=False)) as blocks:
             for block in blocks:
                 figures.take(block.forces, block.deflection, block.q_rad)
                 samples.take(block.motion, block.line, block.forces, block.deflection)

@@ -76,6 +76,15 @@ def test_motion_joints_forces_and_deflection_in_blocks_are_those_as_a_whole(part
     assert planned.issues == whole.motion.issues
 
 
+def test_joints_that_are_remembered_are_those_that_were_solved(part):
+    _, targets, cell = part
+    planned = plan_course(targets, cell, cell.controller.cycle_s)
+    fresh, again = follower_of(planned.course, cell), planned.follower.again()
+    for motion, ends in planned.course.blocks():
+        for solved, known in zip(fresh.take(motion, ends), again.take(motion, ends), strict=True):
+            assert np.array_equal(solved, known, equal_nan=True)
+
+
 def test_a_forecast_says_what_the_prediction_says(part):
     plan = Plan.of(*part)
     whole = forecast_of(collect(plan))

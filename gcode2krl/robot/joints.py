@@ -5,6 +5,7 @@ both agree on its joints, turns included, they are one path, and where not, the 
 it.
 """
 
+import copy
 import itertools
 from collections.abc import Callable
 from typing import NamedTuple
@@ -159,9 +160,14 @@ def trial_rows(count: int) -> Ints:
 class Follower:
     """Joints along a Motion that comes block after block, one branch for all."""
 
-    def __init__(self, trial: Motion, rows: Ints, dt_s: float, cell: Cell) -> None:
-        """Take the samples of the trial, which rows of the Motion they are, and the time between two rows."""
+    def __init__(self, trial: Motion, rows: Ints, dt_s: float, cell: Cell, *, remembers: int = 0) -> None:
+        """Take the samples of the trial, which rows of the Motion they are, and the time between two rows.
+
+        With ``remembers``, the rows of the Motion, their angles are kept for `again`.
+        """
         self._cell, self._window_s = cell, 2.0 * dt_s
+        self._remembered = np.empty((remembers, 6))
+        self._is_solved = False
         starts = np.zeros(len(trial), dtype=np.bool_)
         starts[0] = True
         poses = at_rest(trial.position_mm, trial.rotation, trial.external, cell)
@@ -171,15 +177,24 @@ class Follower:
         self._reached = cell.home_q_rad()
         self._q, self._tool = np.zeros((0, 6)), np.zeros(0, dtype=np.int32)
 
+    def again(self) -> "Follower":
+        """Return what says the same of the same Motion once more."""
+        other = copy.copy(self)
+        other._is_solved, other._row = True, 0
+        other._q, other._tool = np.zeros((0, 6)), np.zeros(0, dtype=np.int32)
+        return other
+
     def take(self, motion: Motion, ends: bool) -> tuple[Floats, Floats]:
         """Return angles and speeds (m, 6) of the rows that follow those returned before.
 
         The last row waits for the one behind it, unless the Motion ``ends`` with it.
         """
-        known, tool = (
-            np.concatenate([self._q, self._angles(motion)]),
-            np.concatenate([self._tool, motion.tool]),
-        )
+        rows = slice(self._row, self._row + len(motion))
+        angles = self._remembered[rows] if self._is_solved else self._angles(motion)
+        if len(self._remembered) and not self._is_solved:
+            self._remembered[rows] = angles
+        self._row = rows.stop
+        known, tool = np.concatenate([self._q, angles]), np.concatenate([self._tool, motion.tool])
         qd = self._speeds(known, tool)
         first, last = max(len(self._q) - 1, 0), len(known) - (not ends)
         self._q, self._tool = known[-2:].copy(), tool[-2:].copy()
@@ -210,7 +225,7 @@ class Follower:
 
         borders = [shared + border for border in chunk_borders(len(motion))]
         self._reached = _solve_parts(solve, q, borders, self._reached)
-        self._before, self._row = rows_of(motion, len(motion) - 1, len(motion)), self._row + len(motion)
+        self._before = rows_of(motion, len(motion) - 1, len(motion))
         return q[shared:]
 
     def _speeds(self, q: Floats, tool: Ints32) -> Floats:
