@@ -10,7 +10,7 @@ from gcode2krl import collision, compliance, cutting, krc4, program, robot
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.clearance import ArmInStock, Beside, Inside, moves_watched_at_targets, watch_of
-from gcode2krl.compiled.threads import ahead
+from gcode2krl.compiled.threads import ahead, in_threads
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.pilot import to_pilot_frame
 from gcode2krl.pose.chatter import ChatterWatch
@@ -82,8 +82,12 @@ def plan_course(
     chain = krc4.build_chain(targets, cell)
     profile = krc4.plan(chain, cell)
     simplify_mm = targets.simplified.tolerance_mm if targets.simplified is not None else None
-    issues = list(krc4.motion_issues(chain, profile, cell, simplify_mm))
-    issues += krc4.corner_issues(targets, chain, profile, cell)
+    free = krc4.plan(chain, cell, look_ahead=False)
+    findings: list[Callable[[], tuple[Issue, ...]]] = [
+        lambda: krc4.motion_issues(chain, profile, free, cell, simplify_mm),
+        lambda: krc4.corner_issues(targets, chain, profile, free, cell),
+    ]
+    issues = [issue for issues in in_threads(lambda found: found(), findings) for issue in issues]
     slower, slowed, planned_s = chain, chain.speed_mm_s, profile.total_s
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)

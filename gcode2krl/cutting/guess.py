@@ -48,7 +48,8 @@ class _Feed:
     @property
     def across_mm(self) -> Floats:
         """Travel (f,) normal to the tool axis."""
-        return np.asarray(np.linalg.norm((self.end_mm - self.start_mm)[:, :2], axis=1))
+        x, y = (self.end_mm - self.start_mm)[:, :2].T
+        return np.asarray(np.sqrt(x * x + y * y))
 
     @property
     def rise_mm(self) -> Floats:
@@ -70,9 +71,9 @@ def guessed_box(toolpath: Toolpath, to_field: Floats, radius_mm: float, deepest_
     if not len(feed.end_mm):
         start = position[known][:1] if known.any() else np.zeros((1, 3))
         return np.array([start[0] - radius_mm, start[0] + [radius_mm, radius_mm, 0.0]])
-    start, end = feed.start_mm[:, :2], feed.end_mm[:, :2]
-    low = np.minimum(start.min(axis=0), end.min(axis=0)) - radius_mm
-    high = np.maximum(start.max(axis=0), end.max(axis=0)) + radius_mm
+    ways = list(zip(feed.start_mm.T[:2], feed.end_mm.T[:2], strict=True))  # numpy is slow along pairs
+    low = np.array([min(start.min(), end.min()) for start, end in ways]) - radius_mm
+    high = np.array([max(start.max(), end.max()) for start, end in ways]) + radius_mm
     bottom = float(feed.end_mm[:, 2].min())
     deepest_mm = (
         deepest_mm if np.allclose(to_field, np.eye(3)) else -np.inf

@@ -36,13 +36,18 @@ class _Reading(NamedTuple):
     chain: Chain
 
 
-def corner_issues(targets: Targets, chain: Chain, profile: Profile, cell: Cell) -> tuple[Issue, ...]:
-    """Return the one note on corners whose path or time depends on what a KRC4 is assumed to do."""
+def corner_issues(
+    targets: Targets, chain: Chain, profile: Profile, free: Profile, cell: Cell
+) -> tuple[Issue, ...]:
+    """Return the one note on corners whose path or time depends on what a KRC4 is assumed to do.
+
+    ``free`` is the profile without the model of ``$ADVANCE``.
+    """
     doubts: list[tuple[float, int, str]] = []
-    free_s = plan(chain, cell, look_ahead=False, pieces=False).total_s
     for reading in _readings(targets, chain, cell):
         # a look-ahead costs far more work, and slows both so that corners matter less
-        other_s = plan(reading.chain, cell, look_ahead=False, pieces=False).total_s + profile.total_s - free_s
+        other_free_s = plan(reading.chain, cell, look_ahead=False, pieces=False).total_s
+        other_s = other_free_s + profile.total_s - free.total_s
         share = abs(other_s / profile.total_s - 1.0) / TIME_SHARE
         if share > _WORTH_A_PLAN:
             other_s = plan(reading.chain, cell, pieces=False).total_s

@@ -206,17 +206,16 @@ def plan(
 
 
 def motion_issues(
-    chain: Chain, profile: Profile, cell: Cell, simplify_mm: float | None = None
+    chain: Chain, profile: Profile, free: Profile, cell: Cell, simplify_mm: float | None = None
 ) -> tuple[Issue, ...]:
     """Return findings on lost time: look-ahead on short moves, stops, and the difference of the two laws.
 
-    ``simplify_mm`` is the tolerance within which moves have been merged already. Notes; together above
-    ``[limits] lost_time_share`` warnings.
+    ``free`` is the profile without the model of ``$ADVANCE``; ``simplify_mm`` the tolerance within which
+    moves have been merged already. Notes; together above ``[limits] lost_time_share`` warnings.
     """
     issues: list[Issue] = []
     lost_whole_s = 0.0
     if cell.controller.advance != "unlimited" and len(chain.length_mm):
-        free = plan(chain, cell, look_ahead=False)
         lost_s = lost_whole_s = profile.total_s - free.total_s
         if lost_s > _WORTH_SAYING * profile.total_s:
             planned, ideal = (np.diff(p.move_end_s, prepend=0.0) for p in (profile, free))

@@ -19,7 +19,7 @@ def note_of(cut, cell=None):
     cell = cell if cell is not None else load_cell()
     targets = set_targets(read(f"{HEAD}{cut}{FOOT}", cell), cell)
     chain = build_chain(targets, cell)
-    issues = corner_issues(targets, chain, plan(chain, cell), cell)
+    issues = corner_issues(targets, chain, plan(chain, cell), plan(chain, cell, look_ahead=False), cell)
     assert len(issues) <= 1
     return issues[0] if issues else None
 
@@ -73,7 +73,7 @@ def test_unequal_accelerations_of_a_turning_tool():
     text = (ROOT / "examples" / "five_axis" / "five_axis.nc").read_text(encoding="utf-8")
     targets = set_targets(read(text, cell), cell)
     chain = build_chain(targets, cell)
-    (note,) = corner_issues(targets, chain, plan(chain, cell), cell)
+    (note,) = corner_issues(targets, chain, plan(chain, cell), plan(chain, cell, look_ahead=False), cell)
     assert "unequal accelerations" in note.message
     ((other_s, assumed_s),) = figures(note, "s")
     assert other_s > assumed_s
@@ -84,4 +84,4 @@ def test_a_program_without_a_line_leaves_nothing_open():
     cell = load_cell()
     targets = set_targets(read("G21 G90 G17 G54\nT1 M6\nG43 H1\nG0 X10 Y10 Z150\nM30\n", cell), cell)
     chain = build_chain(targets, cell)
-    assert corner_issues(targets, chain, plan(chain, cell), cell) == ()
+    assert corner_issues(targets, chain, plan(chain, cell), plan(chain, cell, look_ahead=False), cell) == ()
