@@ -12,7 +12,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compliance import chain, model
-from gcode2krl.compliance.projection import project_rows
+from gcode2krl.compliance.projection import make_directions, project_rows
 from gcode2krl.compliance.rows import rows_of
 
 STANDSTILL_MM_S = 1e-6
@@ -175,10 +175,8 @@ def feed_direction(
 
     For use where there is no path, only joints (n, 6) in rad and their speeds (n, 6) in rad/s.
     """
-    velocity = tip_velocity(q_rad, qd_rad_s, cell, tool)
-    speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, None]
-    rests = speed < STANDSTILL_MM_S
-    direction: Floats = np.where(rests, 0.0, velocity / np.where(rests, 1.0, speed))
+    direction = tip_velocity(q_rad, qd_rad_s, cell, tool)
+    make_directions(direction, STANDSTILL_MM_S)
     return direction
 
 

@@ -8,6 +8,7 @@ from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
 from gcode2krl.compliance.rows import rows_of
 
 _project = core_function("compliance_project", FLOATS, FLOATS, FLOAT, OUT_FLOATS)
+_directions = core_function("compliance_directions", OUT_FLOATS, FLOAT)
 
 
 def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
@@ -42,3 +43,8 @@ def project_normal(r: npt.ArrayLike, v: npt.ArrayLike) -> Floats:
 def project_rows(r: Floats, v: Floats, factor: float, normal: Floats) -> None:
     """Write ``factor`` times the component of each row of r (n, 3) normal to that of v (n, 3)."""
     _project(r, v, factor, normal)
+
+
+def make_directions(velocity: Floats, least: float) -> None:
+    """Make velocities (n, 3) their unit vectors in place, zero where one is less than ``least``."""
+    _directions(velocity, least)

@@ -17,6 +17,7 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import at_rest
 from gcode2krl.compiled.chunks import ROWS, chunk_borders, in_chunks
+from gcode2krl.compiled.core import FLOAT, FLOATS, INTS32, OUT_FLOATS, core_function
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.robot.branch import Branch, Path, best_branch, same_branch, thinned
@@ -29,6 +30,8 @@ from gcode2krl.tables import Joints, Motion, Targets, blocks_of, joined_columns,
 
 _ANGLE_GRID_RAD = 1e-9
 _AGREEMENT_RAD = 1e-9
+
+_speeds = core_function("robot_speeds", FLOATS, INTS32, FLOAT, OUT_FLOATS)
 
 
 def follow(targets: Targets, cell: Cell, conditioning: bool = True) -> tuple[Joints, tuple[Issue, ...]]:
@@ -230,17 +233,8 @@ class Follower:
 
     def _speeds(self, q: Floats, tool: Ints32) -> Floats:
         """Return the central differences (m, 6), 0 in the first and last row and while the tool changes."""
-        qd = np.zeros_like(q)
-        if len(q) > 2:
-
-            def differences(start: int, end: int) -> None:
-                inner = qd[start + 1 : end + 1]
-                np.subtract(q[start + 2 : end + 2], q[start:end], out=inner)
-                inner /= self._window_s
-
-            in_chunks(differences, chunk_borders(len(q) - 2))
-        changed = np.flatnonzero(tool[1:] != tool[:-1])
-        qd[changed], qd[changed + 1] = 0.0, 0.0
+        qd = np.empty_like(q)
+        _speeds(q, tool, self._window_s, qd)
         return qd
 
 

@@ -21,3 +21,14 @@ EXPORT void compliance_project(Floats r, Floats v, double factor, Floats normal)
         to[2] = factor * rz + 0.0;
     }
 }
+
+/* Make each row of v (n, 3) a unit vector, zero where it is shorter than least; NaN stays. The squares are
+   added as a processor adds three in one register: the first and the last, then the second. */
+EXPORT void compliance_directions(Floats v, double least) {
+    for (int64_t i = 0; i < v.rows; i++) {
+        double *row = &CELL(v, i, 0);
+        const double length = sqrt(squared(row[0]) + squared(row[2]) + squared(row[1]));
+        for (int j = 0; j < 3; j++)
+            row[j] = length < least ? 0.0 : row[j] / length;
+    }
+}

@@ -115,6 +115,16 @@ def test_the_angles_are_those_that_moved(rows_in_a_part):
     assert not speeds[[0, -1]].any()
 
 
+def test_joints_rest_beside_a_change_of_the_tool():
+    cell = over_demonstration()
+    q = turning_wrist(turns=1.9)
+    q[:, 4] = np.radians(30)
+    motion = moving(q, cell)
+    _, speeds = motion_angles(replace(motion, tool=np.repeat([1, 2], 100)), cell)
+    rests = np.isin(np.arange(200), [0, 99, 100, 199])
+    np.testing.assert_array_equal(speeds.any(axis=1), ~rests)
+
+
 def test_a_wrong_start_of_a_part_is_put_right(rows_in_a_part, monkeypatch):
     """The trial's joints are only a guess: parts that start a turn off are solved again."""
     cell = over_demonstration()
