@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -68,6 +68,11 @@ def in_threads(
     if errors:
         raise errors[min(errors)]
     return [results[k] for k in range(len(tasks))]
+
+
+def in_background(work: Callable[[], Result]) -> "Future[Result]":
+    """Begin work that waits rather than computes, as for a disk; whoever begins it waits for its end."""
+    return _helpers().submit(work)
 
 
 @cache

@@ -15,9 +15,15 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from gcode2krl.compiled.threads import in_background
 from gcode2krl.errors import NotUnderstoodError, input_error
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 Content = bytes | Iterable[bytes] | Callable[[Path], object]
 """The content of a file, its pieces, or a function that writes it to a path."""
@@ -79,6 +85,7 @@ class Staging:
     def __init__(self) -> None:
         """Begin without a file."""
         self._temporary: dict[Path, Path] = {}
+        self._on_disk: dict[Path, Future[None]] = {}
         self._begun_with: dict[str, _Stamp] = {}
 
     def __enter__(self) -> "Staging":
@@ -90,14 +97,17 @@ class Staging:
     def write(self, place: Path, content: Content) -> Path:
         """Write what will stand at a place, and return where it stands until then.
 
-        Raises `NotUnderstoodError` where folder or disk refuse.
+        It can be read at once; `take_places` waits until the disk has it. Raises `NotUnderstoodError` where
+        folder or disk refuse.
         """
         _remove(leftovers(place))
         self.expect(place)
         try:
-            self._temporary[place] = _write_beside(place, content)
+            self._temporary[place], kept = _write_beside(place, content)
         except OSError as error:
             raise unwritable(place, error.strerror or str(error)) from None
+        if kept is not None:
+            self._on_disk[place] = in_background(partial(_sync, kept))
         return self._temporary[place]
 
     def expect(self, place: Path) -> None:
@@ -113,6 +123,11 @@ class Staging:
 
         Raises `NotUnderstoodError` where the disk refuses, or another process has written one of them since.
         """
+        for place, done in self._on_disk.items():
+            try:
+                done.result()
+            except OSError as error:
+                raise unwritable(place, error.strerror or str(error)) from None
         with contextlib.ExitStack() as stack:
             for folder in sorted({place.parent.resolve() for place in self._temporary}):
                 stack.enter_context(_alone_in(folder))
@@ -145,6 +160,9 @@ class Staging:
 
     def discard(self) -> None:
         """Remove the files that have not taken their places."""
+        for done in self._on_disk.values():
+            done.exception()  # waited for: not everywhere can an open file be removed
+        self._on_disk.clear()
         _remove(self._temporary.values())
         self._temporary.clear()
 
@@ -351,27 +369,36 @@ def _remove(files: Iterable[Path]) -> None:
             file.unlink(missing_ok=True)
 
 
-def _write_beside(target: Path, content: Content) -> Path:
+def _write_beside(target: Path, content: Content) -> tuple[Path, int | None]:
+    """Write a file beside its place; return its path, and for `_sync` a descriptor of what has pieces."""
     if target.is_dir():
         raise IsADirectoryError(0, "this is a folder")
     prefix = f".{target.name}.{_HOST}-{os.getpid()}-"
     descriptor, name = tempfile.mkstemp(prefix=prefix, suffix=".part", dir=target.parent)
-    written = Path(name)
+    written, kept = Path(name), None
     try:
         with os.fdopen(descriptor, "wb") as stream:
             if not callable(content):
                 stream.writelines([content] if isinstance(content, bytes) else content)
-                stream.flush()
-                os.fsync(stream.fileno())
+                kept = os.dup(descriptor)
         if callable(content):
             content(written)
         mode = target.stat().st_mode if target.exists() else 0o666 & ~_umask()
         written.chmod(mode & 0o777)
     except BaseException:
         with contextlib.suppress(OSError):
+            if kept is not None:
+                os.close(kept)
             written.unlink()
         raise
-    return written
+    return written, kept
+
+
+def _sync(descriptor: int) -> None:
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _umask() -> int:
