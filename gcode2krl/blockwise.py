@@ -143,7 +143,7 @@ def _seen_along(
     guard = _Guard.over(targets, cell, line, keeps=keeps) if watches else None
     follower = None
     if judges_joints or guard is not None:
-        follower = follower_of(course, cell, remembers=0 if keeps else course.count)
+        follower = follower_of(course, cell, remembers=not keeps)
     share = np.zeros(len(line)) if judges_joints else None
     gathered, waiting = Gathered[Motion](course.count), np.zeros((2, 0), dtype=np.int32)
     carried = np.zeros((0, 6))
@@ -216,7 +216,7 @@ class _Guard:
         )
 
 
-def follower_of(course: krc4.Course, cell: Cell, *, remembers: int = 0) -> robot.Follower:
+def follower_of(course: krc4.Course, cell: Cell, *, remembers: bool = False) -> robot.Follower:
     """Return what solves the joints along a motion, see `robot.Follower`."""
     rows = robot.trial_rows(course.count)
     return robot.Follower(course.at(rows), rows, course.dt_s, cell, remembers=remembers)
@@ -348,7 +348,7 @@ class Loads:
         if self._missing is None and self._force_limits.absurd is None:
             with np.errstate(all="ignore"):  # an absurd result becomes a finding
                 deflection = compliance.deflect_at(q_rad, qd_rad_s, motion.external, forces, self._cell)
-            reached = np.asarray(np.isfinite(q_rad).all(axis=1))
+            reached = np.isfinite(q_rad[:, 0])  # a pose out of reach has no angle at all
             self._deflection_limit.take(deflection, reached, line)
         return Block(motion, line, forces, deflection, q_rad)
 

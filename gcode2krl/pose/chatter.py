@@ -70,7 +70,7 @@ def coupling_along(
     >>> len(along.coupling) <= 400
     True
     """
-    cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0) & np.isfinite(q_rad).all(axis=1)
+    cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0) & np.isfinite(q_rad[:, 0])
     rows = np.flatnonzero(cuts)
     rows = rows[distinct(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
     cut, moved, pose = rows_at(forces, rows), rows_at(motion, rows), q_rad[rows]

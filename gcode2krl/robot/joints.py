@@ -7,6 +7,8 @@ it.
 
 import copy
 import itertools
+import mmap
+from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -163,14 +165,16 @@ def trial_rows(count: int) -> Ints:
 class Follower:
     """Joints along a Motion that comes block after block, one branch for all."""
 
-    def __init__(self, trial: Motion, rows: Ints, dt_s: float, cell: Cell, *, remembers: int = 0) -> None:
+    def __init__(
+        self, trial: Motion, rows: Ints, dt_s: float, cell: Cell, *, remembers: bool = False
+    ) -> None:
         """Take the samples of the trial, which rows of the Motion they are, and the time between two rows.
 
-        With ``remembers``, the rows of the Motion, their angles are kept for `again`.
+        With ``remembers`` the angles are kept for `again`.
         """
         self._cell, self._window_s = cell, 2.0 * dt_s
-        self._remembered = np.empty((remembers, 6))
-        self._is_solved = False
+        self._remembered: deque[Floats] | None = deque() if remembers else None
+        self._solved: deque[Floats] | None = None
         starts = np.zeros(len(trial), dtype=np.bool_)
         starts[0] = True
         poses = at_rest(trial.position_mm, trial.rotation, trial.external, cell)
@@ -181,9 +185,9 @@ class Follower:
         self._q, self._tool = np.zeros((0, 6)), np.zeros(0, dtype=np.int32)
 
     def again(self) -> "Follower":
-        """Return what says the same of the same Motion once more."""
+        """Return what says the same of the same blocks once more, and lets go what it has said."""
         other = copy.copy(self)
-        other._is_solved, other._row = True, 0
+        other._solved, other._remembered = self._remembered, None
         other._q, other._tool = np.zeros((0, 6)), np.zeros(0, dtype=np.int32)
         return other
 
@@ -192,11 +196,9 @@ class Follower:
 
         The last row waits for the one behind it, unless the Motion ``ends`` with it.
         """
-        rows = slice(self._row, self._row + len(motion))
-        angles = self._remembered[rows] if self._is_solved else self._angles(motion)
-        if len(self._remembered) and not self._is_solved:
-            self._remembered[rows] = angles
-        self._row = rows.stop
+        angles = self._angles(motion) if self._solved is None else self._solved.popleft()
+        if self._remembered is not None:
+            self._remembered.append(_of_its_own(angles))
         known, tool = np.concatenate([self._q, angles]), np.concatenate([self._tool, motion.tool])
         qd = self._speeds(known, tool)
         first, last = max(len(self._q) - 1, 0), len(known) - (not ends)
@@ -228,7 +230,7 @@ class Follower:
 
         borders = [shared + border for border in chunk_borders(len(motion))]
         self._reached = _solve_parts(solve, q, borders, self._reached)
-        self._before = rows_of(motion, len(motion) - 1, len(motion))
+        self._before, self._row = rows_of(motion, len(motion) - 1, len(motion)), self._row + len(motion)
         return q[shared:]
 
     def _speeds(self, q: Floats, tool: Ints32) -> Floats:
@@ -236,6 +238,13 @@ class Follower:
         qd = np.empty_like(q)
         _speeds(q, tool, self._window_s, qd)
         return qd
+
+
+def _of_its_own(values: Floats) -> Floats:
+    """Return a copy in memory that goes back to the system at once where it is let go."""
+    copied = np.frombuffer(mmap.mmap(-1, max(values.nbytes, 1)), count=values.size).reshape(values.shape)
+    copied[:] = values
+    return copied
 
 
 def joints_from_angles(motion: Motion, q_rad: Floats, qd_rad_s: Floats, cell: Cell) -> Joints:
