@@ -83,6 +83,10 @@ def _helpers() -> "ThreadPoolExecutor":
     return ThreadPoolExecutor(_MOST_HELPERS, thread_name_prefix=HELPER)
 
 
+if hasattr(os, "register_at_fork"):  # a forked process has none of the threads of its parent
+    os.register_at_fork(after_in_child=_helpers.cache_clear)
+
+
 @contextmanager
 def ahead(items: Generator[Result, None, None], threads: int | None = None) -> Iterator[Iterator[Result]]:
     """Give items, the next of which is made in a thread while one is worked on, and close them at the end.

@@ -1,6 +1,7 @@
 """Work in threads: results in the order of the tasks, no more threads than asked for, errors not lost."""
 
 import multiprocessing
+import os
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -8,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from gcode2krl import read_gcode
-from gcode2krl.compiled.threads import HELPER, THREADS_VARIABLE, ahead, cores, in_threads
+from gcode2krl.compiled.threads import HELPER, THREADS_VARIABLE, ahead, cores, in_background, in_threads
 from gcode2krl.errors import NotUnderstoodError
 
 
@@ -57,6 +58,15 @@ def test_threads_are_kept_for_the_next_work():
     for _ in range(200):
         in_threads(str, range(2), 2)
     assert threading.active_count() < before + 20
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks on Windows")
+def test_a_forked_process_starts_threads_of_its_own():
+    assert in_background(lambda: 1).result() == 1
+    process = os.fork()
+    if not process:
+        os._exit(0 if in_background(lambda: 1).result(timeout=10.0) == 1 else 1)
+    assert os.waitpid(process, 0)[1] == 0
 
 
 def test_no_tasks_no_results():
