@@ -39,8 +39,8 @@ def add_effects(
     applied = [*from_cell(cell, known), *resolve(effects, known, cell)]
     changed = with_effects(prediction, applied, plan=_plan_anew(prediction))
     named = [str(effect) for effect in effects]
-    told = (*changed.skipped, *_weights_unknown(applied, cell))
-    return replace(changed, skipped=told, inputs={**changed.inputs, "effects": named})
+    issues = (*changed.skipped, *_weights_unknown(applied, cell))
+    return replace(changed, skipped=issues, inputs={**changed.inputs, "effects": named})
 
 
 def _weights_unknown(applied: "Sequence[Applied]", cell: Cell) -> Iterator[Issue]:

@@ -10,11 +10,13 @@ mix.
 import argparse
 import json
 import math
+import multiprocessing
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -71,14 +73,10 @@ def long_program(rows: int = ROWS) -> Writer:
 
 
 def timing(seconds: float = ROWS * ROW_S, effect: str = EFFECT, size: float = SIZE, times: int = 2) -> str:
-    """Return how long predictions, plant and diagnosis took, and the peak memory of the whole process.
+    """Return how long predictions, plant and diagnosis took, and the diagnosis's peak memory.
 
-    The first diagnosis loads compiled code. One of long runs takes minutes and gigabytes.
+    It has a process of its own; the first one loads compiled code. One of long runs takes minutes.
     """
-    import resource  # where there is one: not on Windows
-
-    from gcode2krl.gap import diagnose
-
     program = long_program(max(1, round(seconds / ROW_S)))
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -89,21 +87,28 @@ def timing(seconds: float = ROWS * ROW_S, effect: str = EFFECT, size: float = SI
         marks.append(time.perf_counter())
         length_s = _runs(folder, program, effect, size)
         marks.append(time.perf_counter())
-        answers = []
-        for _ in range(times):
-            runs = [load_run(folder / f"run-{i + 1}") for i in range(3)]
-            gap = diagnose(Prediction.load(folder / "prediction"), runs).as_dict()
-            answers.append(
-                ", ".join(f"{c['effect']} {c['target']} {c['probability']:.2f}" for c in gap["causes"])
-            )
-            marks.append(time.perf_counter())
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            for _ in range(times):
+                verdict, causes, peak_MB = pool.submit(_diagnosis, folder).result()
+                marks.append(time.perf_counter())
     parts = np.diff(marks)
-    peak_MB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     diagnoses = ", ".join(f"{part:.1f} s" for part in parts[2:])
     return (
         f"three runs of {length_s:.0f} s with {effect}: prediction {parts[0]:.1f} s, plant {parts[1]:.1f} s, "
-        f"diagnosis {diagnoses}, peak {peak_MB:.0f} MB ({gap['verdict']}: {answers[-1] or 'no cause'})"
+        f"diagnosis {diagnoses}, peak {peak_MB:.0f} MB ({verdict}: {causes or 'no cause'})"
     )
+
+
+def _diagnosis(folder: Path) -> tuple[str, str, float]:
+    """Return the verdict, the causes, and the peak memory of this process in MB."""
+    import resource  # where there is one: not on Windows
+
+    from gcode2krl.gap import diagnose
+
+    runs = [load_run(folder / f"run-{i + 1}") for i in range(3)]
+    gap = diagnose(Prediction.load(folder / "prediction"), runs).as_dict()
+    causes = ", ".join(f"{c['effect']} {c['target']} {c['probability']:.2f}" for c in gap["causes"])
+    return gap["verdict"], causes, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _runs(folder: Path, program: Writer, effect: str, size: float) -> float:

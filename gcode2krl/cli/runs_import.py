@@ -71,10 +71,10 @@ def command(
 
         named = os.path.relpath(prediction, folder) if prediction is not None else ""
         if is_native(source):
-            written, found = write_native(source, folder, named)
-            console.findings(found, log)
+            written, issues = write_native(source, folder, named)
+            console.findings(issues, log)
             console.say(f"{log} -> {folder}: its format states what each column is")
-            return console.record({}, found, files=written) if as_json else 0
+            return console.record({}, issues, files=written) if as_json else 0
         guess = _guess(source, folder, columns, unit, order, joints, prediction, like)
         console.say("\n".join(shown(guess)))
         guess.require_certain(f"gcode2krl runs import {log} -o {folder}/")

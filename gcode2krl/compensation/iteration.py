@@ -252,8 +252,8 @@ def _refuse_turns_on_the_spot(
     """Raise where the tool turns without a way in a cut, or moved aside: no correction goes with that."""
     turns = (targets.move >= 0) & ~targets.ptp & (ways.length_mm == 0.0) & ways.turn.any(axis=1)
     loaded = np.isin(targets.move, motion.move[forces.force_base_N.any(axis=1)])
-    beside = np.append(False, shift.target_mm[:-1].any(axis=1))
-    rows = np.flatnonzero(turns & (loaded | beside))
+    is_aside = np.append(False, shift.target_mm[:-1].any(axis=1))
+    rows = np.flatnonzero(turns & (loaded | is_aside))
     if not len(rows):
         return
     sentence = "the tool turns on the spot in material: the correction changes along a way, and there is none"

@@ -124,8 +124,8 @@ class Dexels(NamedTuple):
                 ((at + 0.5) * size_mm[k] / self.cell_mm[k]).astype(np.int64)
                 for at, k in ((row, v), (column, u))
             )
-            own = own_firsts[axis] + _ray(own_row, own_column, self.cells[u])
-            near[firsts[axis] + _ray(row, column, cells[u])] = own
+            nearest = own_firsts[axis] + _ray(own_row, own_column, self.cells[u])
+            near[firsts[axis] + _ray(row, column, cells[u])] = nearest
         filled = np.where(near >= 0, self.rays["filled"][near], 0).astype(np.int64)
         made = _with_ends(low_mm, size_mm, cells, filled)
         ends = 2 * filled
@@ -225,7 +225,7 @@ def _crossed(
     are a little beside the middles of cells, by shares of a cell that no mesh has.
     """
     u, v = (axis + 1) % 3, (axis + 2) % 3
-    beside = {u: 0.5 + 1.234567e-5, v: 0.5 + 2.345678e-5}
+    off_middle = {u: 0.5 + 1.234567e-5, v: 0.5 + 2.345678e-5}
     rays, places, normals = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros((0, 3))]
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     for corners, normal in zip(triangles, across, strict=True):
@@ -233,10 +233,10 @@ def _crossed(
             continue
         spans = {}
         for k in (u, v):
-            at = (corners[:, k] - low[k]) / size[k] - beside[k]
+            at = (corners[:, k] - low[k]) / size[k] - off_middle[k]
             spans[k] = np.arange(max(int(np.ceil(at.min())), 0), min(int(at.max()) + 1, cells[k]))
-        x = low[u] + (spans[u] + beside[u]) * size[u]
-        y = (low[v] + (spans[v] + beside[v]) * size[v])[:, None]
+        x = low[u] + (spans[u] + off_middle[u]) * size[u]
+        y = (low[v] + (spans[v] + off_middle[v]) * size[v])[:, None]
         inside = np.ones((len(spans[v]), len(spans[u])), dtype=np.bool_)
         for a, b in ((0, 1), (1, 2), (2, 0)):
             p, q = corners[a], corners[b]

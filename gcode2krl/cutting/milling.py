@@ -96,7 +96,7 @@ def _between(
     )
     after, start, u, w = after[meets], start[meets], u[meets], w[meets]
     to_vertex, from_vertex, way_mm, cosine = (
-        each[meets] for each in (to_vertex, from_vertex, way_mm, cosine)
+        values[meets] for values in (to_vertex, from_vertex, way_mm, cosine)
     )
     vertex = start + to_vertex[:, None] * u
     saved = 2.0 - _parabola_length(cosine)
@@ -372,8 +372,8 @@ class Milling:
 
     def issues(self) -> tuple[Issue, ...]:
         """Return what was found, by line."""
-        found = self._checks.issues() if self._checks is not None else ()
-        return (*found, _AXIS_TURNS) if isinstance(self._engagement, TurnedEngagement) else found
+        issues = self._checks.issues() if self._checks is not None else ()
+        return (*issues, _AXIS_TURNS) if isinstance(self._engagement, TurnedEngagement) else issues
 
     def raw_box(self) -> RawBox:
         """Return the box around the material before the first cut."""
@@ -474,25 +474,25 @@ class Milling:
         return followed(above, points._replace(rapid=np.append(True, points.rapid[1:])))
 
     def _forces(self, rows: _UncutSamples, engaged: Engaged) -> Forces:
-        found, checks = engaged.result, self._checks
+        cut, checks = engaged.result, self._checks
         # a rapid through material is reported as a collision, and is not a cut
-        for column in (found.force_N, found.moment_Nmm, found.torque_Nmm):
+        for column in (cut.force_N, cut.moment_Nmm, cut.torque_Nmm):
             column[rows.rapid] = 0.0
-        mean_N = lengths(found.force_N)
+        mean_N = lengths(cut.force_N)
         forces = Forces(
-            force_base_N=turned(found.force_N, self._to_field.T),
-            moment_base_Nmm=turned(found.moment_Nmm, self._to_field.T),
-            peak_N=mean_N if self._peaks is None else self._peaks.take(found, rows.f_z_mm, rows.tool, mean_N),
-            torque_Nmm=found.torque_Nmm,
-            a_p_mm=found.a_p_mm,
-            a_e_mm=found.a_e_mm,
-            phi_rad=found.phi_rad,
+            force_base_N=turned(cut.force_N, self._to_field.T),
+            moment_base_Nmm=turned(cut.moment_Nmm, self._to_field.T),
+            peak_N=mean_N if self._peaks is None else self._peaks.take(cut, rows.f_z_mm, rows.tool, mean_N),
+            torque_Nmm=cut.torque_Nmm,
+            a_p_mm=cut.a_p_mm,
+            a_e_mm=cut.a_e_mm,
+            phi_rad=cut.phi_rad,
             tool=rows.number,
             relative_band=self._band,
         )
         if checks is not None:
-            overlap_mm = found.overlap_mm[:, 1:]
-            overlap_mm[:, 0] = np.maximum(overlap_mm[:, 0], found.a_p_mm - self._flutes_mm[rows.tool])
+            overlap_mm = cut.overlap_mm[:, 1:]
+            overlap_mm[:, 0] = np.maximum(overlap_mm[:, 0], cut.a_p_mm - self._flutes_mm[rows.tool])
             checks.take(rows, engaged, overlap_mm, forces)
         return forces
 
@@ -506,15 +506,15 @@ class _Checks:
     uses: Uses
 
     def take(self, rows: _UncutSamples, engaged: Engaged, overlap_mm: Floats, forces: Forces) -> None:
-        found = engaged.result
+        milled = engaged.result
         cut = Cut(
             source_line=rows.source_line,
             rapid=rows.rapid,
             engaged=np.isfinite(forces.phi_rad[:, 0]),
             spindle_rad_s=rows.spindle_rad_s,
             f_z_mm=rows.f_z_mm,
-            ramp_rad=found.ramp_rad,
-            centre_mm=found.centre_mm,
+            ramp_rad=milled.ramp_rad,
+            centre_mm=milled.centre_mm,
             overlap_mm=overlap_mm,
             step_mm=rows.step_mm,
             descent_mm=rows.descent_mm,
@@ -522,7 +522,7 @@ class _Checks:
         self.findings.take(cut, forces)
         self.findings.rapids_met(engaged.rapid_row, engaged.rapid_mm, engaged.settled)
         self.stock.take(Work(rows.position_mm, rows.tool, rows.source_line, rows.feed, cut.engaged))
-        of_uses = (rows.source_line, rows.rapid, rows.programmed_f_z_mm, found.ramp_rad, found.centre_mm)
+        of_uses = (rows.source_line, rows.rapid, rows.programmed_f_z_mm, milled.ramp_rad, milled.centre_mm)
         self.uses.take(*of_uses, forces)
 
     def issues(self) -> tuple[Issue, ...]:
@@ -625,11 +625,11 @@ class _Peaks:
         peak = np.zeros(len(mean_N))
         cuts = np.isfinite(engaged.phi_rad[:, 0]) & (mean_N > 0.0)
         read, between = np.flatnonzero(cuts & engaged.is_read), np.flatnonzero(cuts & ~engaged.is_read)
-        for number, one in enumerate(self._tools):
+        for number, cutter in enumerate(self._tools):
             rows = read[tool[read] == number]
             if len(rows):
                 arcs, depth, ramp = engaged.phi_rad[rows], engaged.a_p_mm[rows], engaged.ramp_rad[rows]
-                peak[rows] = peak_force(one, self._law, arcs, depth, f_z_mm[rows], ramp)
+                peak[rows] = peak_force(cutter, self._law, arcs, depth, f_z_mm[rows], ramp)
         row = np.concatenate([self._row, read])
         known_N = np.concatenate([self._known_N, [peak[read], mean_N[read]]], axis=1)
         if len(between):

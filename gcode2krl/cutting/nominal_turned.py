@@ -78,13 +78,13 @@ def compare_turned(
     where the mesh encloses no solid.
     """
     wanted = mesh_of(solid_of(nominal))
-    found = _deep(_stretches(dexels, wanted), lambda places_mm: nearest_on(wanted, places_mm))
+    stretches = _deep(_stretches(dexels, wanted), lambda places_mm: nearest_on(wanted, places_mm))
     differences: list[Difference] = []
     left_out: dict[Kind, int] = {}
     volume_mm3: dict[Kind, float] = {}
     kinds: tuple[Kind, ...] = ("gouge", "rest")
     for kind in kinds:
-        of_kind = taken(found, np.flatnonzero(found.is_gouge == (kind == "gouge")))
+        of_kind = taken(stretches, np.flatnonzero(stretches.is_gouge == (kind == "gouge")))
         groups = _groups(of_kind, dexels)
         volumes = [_volume_mm3(group, dexels.cell_mm) for group in groups]
         volume_mm3[kind], left_out[kind] = float(sum(volumes)), max(len(groups) - MOST_SOLIDS, 0)
@@ -94,14 +94,14 @@ def compare_turned(
             depth_mm = float(group.depth_mm.max())
             differences.append(Difference(kind, volumes[number], depth_mm, deepest, -1, solid))
     rows = _nearest_samples(np.array([one.place_mm for one in differences]).reshape(-1, 3), motion, cell)
-    stretch, end = np.nonzero(found.is_cut & (found.depth_mm[:, :2] > TOLERANCE_MM))
-    sign = np.where(found.is_gouge[stretch], -1.0, 1.0)
+    stretch, end = np.nonzero(stretches.is_cut & (stretches.depth_mm[:, :2] > TOLERANCE_MM))
+    sign = np.where(stretches.is_gouge[stretch], -1.0, 1.0)
     return Comparison(
         tuple(replace(one, row=row) for one, row in zip(differences, rows, strict=True)),
         left_out,
         volume_mm3,
-        sign * found.depth_mm[stretch, end],
-        found.place_mm[stretch, end],
+        sign * stretches.depth_mm[stretch, end],
+        stretches.place_mm[stretch, end],
     )
 
 
@@ -141,28 +141,28 @@ def _parity(ray: Ints) -> Ints:
     return (place - np.maximum.accumulate(np.where(begins, place, 0))) % 2
 
 
-def _deep(found: _Stretches, nearest: Callable[[Floats], Floats]) -> _Stretches:
+def _deep(stretches: _Stretches, nearest: Callable[[Floats], Floats]) -> _Stretches:
     """Return the stretches that are deeper than `TOLERANCE_MM`, with their depths."""
-    is_asked = np.column_stack([found.is_cut, np.ones(len(found.axis), np.bool_)])
-    away_mm = np.zeros_like(found.place_mm)
-    asked_mm = found.place_mm[is_asked]
+    is_asked = np.column_stack([stretches.is_cut, np.ones(len(stretches.axis), np.bool_)])
+    away_mm = np.zeros_like(stretches.place_mm)
+    asked_mm = stretches.place_mm[is_asked]
     away_mm[is_asked] = asked_mm - nearest(asked_mm)
     depth_mm = np.sqrt((away_mm**2).sum(axis=2))
     every, deepest = np.arange(len(depth_mm)), depth_mm.argmax(axis=1)
     most_mm = depth_mm[every, deepest]
     toward = away_mm[every, deepest] / np.maximum(most_mm, 1e-12)[:, None]
     deep = np.flatnonzero(most_mm > TOLERANCE_MM)
-    return taken(found._replace(depth_mm=depth_mm, toward=toward), deep)
+    return taken(stretches._replace(depth_mm=depth_mm, toward=toward), deep)
 
 
-def _groups(found: _Stretches, dexels: Dexels) -> list[_Stretches]:
+def _groups(stretches: _Stretches, dexels: Dexels) -> list[_Stretches]:
     """Return the stretches of each place: those whose deep ends and middles touch, or are of one stretch."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     size_mm = _TOGETHER_CELLS * float(dexels.cell_mm.max())
-    stretch, which = np.nonzero(found.depth_mm > TOLERANCE_MM)
-    cube = np.floor((found.place_mm[stretch, which] - dexels.low_mm) / size_mm).astype(np.int64)
+    stretch, which = np.nonzero(stretches.depth_mm > TOLERANCE_MM)
+    cube = np.floor((stretches.place_mm[stretch, which] - dexels.low_mm) / size_mm).astype(np.int64)
     cube -= cube.min(axis=0, initial=0) - 1
     sides = cube.max(axis=0, initial=1) + 2
     strides = np.array([1, sides[0], sides[0] * sides[1]])
@@ -179,7 +179,7 @@ def _groups(found: _Stretches, dexels: Dexels) -> list[_Stretches]:
     of_stretch = of_node[node[first]]
     order = np.argsort(of_stretch, kind="stable")
     rows = np.split(order, np.searchsorted(of_stretch[order], np.arange(1, count))) if count else []
-    return [taken(found, each) for each in rows if len(each) >= FEWEST_CELLS]
+    return [taken(stretches, each) for each in rows if len(each) >= FEWEST_CELLS]
 
 
 def _volume_mm3(group: _Stretches, cell_mm: Floats) -> float:

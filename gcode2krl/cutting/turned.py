@@ -233,8 +233,8 @@ def _short_bands(tool: Tool, cell_mm: float) -> Floats:
         count = max(1, math.ceil((band[1] - band[0]) / tall_mm - 1e-9))
         share = np.linspace(0.0, 1.0, count + 1)
         z, r = (band[k] + share * (band[k + 1] - band[k]) for k in (0, 2))
-        rest = np.broadcast_to([band[4], band[5], band[6] / count], (count, 3))
-        pieces.append(np.column_stack([z[:-1], z[1:], r[:-1], r[1:], rest]))
+        others = np.broadcast_to([band[4], band[5], band[6] / count], (count, 3))
+        pieces.append(np.column_stack([z[:-1], z[1:], r[:-1], r[1:], others]))
     return np.concatenate(pieces)
 
 

@@ -120,8 +120,11 @@ def added_columns(signals: Signals) -> dict[str, Floats]:
     return columns
 
 
-def remembered(cut: Cut, most: int = 64) -> Cut:
-    """Return a ``cut`` that removes the material once for each motion and cell, the last ``most`` of them."""
+def remembered(cut: Cut, most: int = 64, most_rows: int = 200_000) -> Cut:
+    """Return a ``cut`` that removes the material once for each motion and cell, and keeps the last of them.
+
+    Of long motions fewer: a row of forces takes 300 bytes.
+    """
     known: OrderedDict[tuple[bytes, str], Forces] = OrderedDict()
 
     def once(motion: Motion, cell: Cell) -> Forces:
@@ -130,7 +133,7 @@ def remembered(cut: Cut, most: int = 64) -> Cut:
         key = (digest.digest(), cell.model_dump_json(include={"tool", "material", "stock", "frames"}))
         if key not in known:
             known[key] = cut(motion, cell)
-            if len(known) > most:
+            while len(known) > most or (len(known) > 1 and sum(map(len, known.values())) > most_rows):
                 known.popitem(last=False)
         return known[key]
 

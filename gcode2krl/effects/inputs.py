@@ -195,6 +195,11 @@ class Inputs:
         down: Floats = self.cell.base_in_world()[:3, :3].T @ np.array([0.0, 0.0, -1.0])
         return down
 
+    @of_the_command
+    def rate_rad_s(self) -> Floats:
+        """(m, 6) velocities of the commanded joints."""
+        return gradient(self.q_cmd_rad, self.time_s)
+
     @of_the_path
     def jacobian(self) -> Floats:
         """(m, 6, 6) of the tip at the commanded joints, along ``$BASE``."""

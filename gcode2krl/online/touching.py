@@ -44,20 +44,20 @@ def touching_of(prediction: Prediction) -> Touching | None:
     axis = tool_axes(motion)
     if np.abs(axis - axis[:1]).max(initial=0.0) < 1e-6:
         return None
-    left = remove(prediction.toolpath, motion, cell, is_checked=False).left
-    if not isinstance(left, Dexels):
+    part = remove(prediction.toolpath, motion, cell, is_checked=False).left
+    if not isinstance(part, Dexels):
         return None
     velocity, swing = (np.gradient(each, motion.time_s, axis=0) for each in (motion.position_mm, axis))
-    found = [Touching(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
+    touching = [Touching(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
     cuts = forces.force_base_N.any(axis=1)
     for number in np.unique(motion.tool[cuts]).tolist():
         row = np.flatnonzero(cuts & (motion.tool == number))
         for r, z, kappa in _outline(cell.tool[number], forces.a_p_mm[row]):
-            found += _sides(row, motion.position_mm, axis, velocity, swing, r, z, kappa)
-    sample = np.concatenate([each.row for each in found])
-    point_mm = np.concatenate([each.point_mm for each in found])
-    normal = np.concatenate([each.normal for each in found])
-    on_part = np.abs(left.depths(point_mm)) < _ON_SURFACE_MM
+            touching += _sides(row, motion.position_mm, axis, velocity, swing, r, z, kappa)
+    sample = np.concatenate([each.row for each in touching])
+    point_mm = np.concatenate([each.point_mm for each in touching])
+    normal = np.concatenate([each.normal for each in touching])
+    on_part = np.abs(part.depths(point_mm)) < _ON_SURFACE_MM
     return Touching(sample[on_part], point_mm[on_part], normal[on_part])
 
 

@@ -209,8 +209,8 @@ def _list_worst(
 
 def _corners(values: Floats) -> Floats:
     """Return what stands at the four corners (f, 4, k) of the squares between points (r, c, k)."""
-    each = [values[:-1, :-1], values[:-1, 1:], values[1:, 1:], values[1:, :-1]]
-    return np.stack(each, axis=2).reshape(-1, 4, values.shape[2])
+    corners = [values[:-1, :-1], values[:-1, 1:], values[1:, 1:], values[1:, :-1]]
+    return np.stack(corners, axis=2).reshape(-1, 4, values.shape[2])
 
 
 def _lit(normal: Floats) -> Floats:

@@ -18,7 +18,7 @@ def evidence(on, nats, place="tip"):
         inflation=1.0,
         flipped=np.zeros(1),
         unbounded=nats,
-        signal=(),
+        said=(),
     )
 
 

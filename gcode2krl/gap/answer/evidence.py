@@ -95,7 +95,7 @@ def _angle(trace: Trace, samples: Ints, at: str | None) -> Against | None:
 def _speed(trace: Trace, samples: Ints, at: str | None) -> Against | None:
     joint, inputs = _joint(at), trace.inputs
     if joint is not None:
-        speed = gradient(inputs.q_cmd_rad, inputs.time_s)[samples, joint]
+        speed = inputs.rate_rad_s[samples, joint]
         return Against(f"speed of {at} (deg/s)", DEG_PER_RAD * speed)
     if not knows_place(inputs):
         return None
@@ -105,7 +105,7 @@ def _speed(trace: Trace, samples: Ints, at: str | None) -> Against | None:
 def _acceleration(trace: Trace, samples: Ints, at: str | None) -> Against | None:
     joint, inputs = _joint(at), trace.inputs
     if joint is not None:
-        rate = gradient(gradient(inputs.q_cmd_rad, inputs.time_s), inputs.time_s)[samples, joint]
+        rate = gradient(inputs.rate_rad_s, inputs.time_s)[samples, joint]
         return Against(f"acceleration of {at} (deg/s²)", DEG_PER_RAD * rate)
     rate = gradient(inputs.velocity_mm_s, inputs.time_s)[samples]
     return Against("acceleration of the tip (mm/s²)", np.linalg.norm(rate, axis=1))
@@ -115,7 +115,7 @@ def _jerk(trace: Trace, samples: Ints, at: str | None) -> Against | None:
     joint, inputs = _joint(at), trace.inputs
     if joint is None:
         return None
-    acceleration = gradient(gradient(inputs.q_cmd_rad[:, joint], inputs.time_s), inputs.time_s)
+    acceleration = gradient(inputs.rate_rad_s[:, joint], inputs.time_s)
     return Against(f"jerk of {at} (deg/s³)", DEG_PER_RAD * gradient(acceleration, inputs.time_s)[samples])
 
 

@@ -274,23 +274,19 @@ class Admissible:
     @cached_property
     def rate_rad_s(self) -> Floats:
         """(n, 6) velocities of the joints."""
-        return self._at(self._rate)
+        return self._at(self.trace.inputs.rate_rad_s)
 
     @cached_property
     def acceleration_rad_s2(self) -> Floats:
         """(n, 6) accelerations of the joints."""
-        return self._at(gradient(self._rate, self.trace.inputs.time_s))
+        return self._at(gradient(self.trace.inputs.rate_rad_s, self.trace.inputs.time_s))
 
     def jerk(self, joint: int) -> Floats:
         """Return how fast a joint's commanded acceleration changes, (n, c), as servos follow it."""
         inputs = self.trace.inputs
-        jerk = gradient(gradient(self._rate[:, joint], inputs.time_s), inputs.time_s)
+        jerk = gradient(gradient(inputs.rate_rad_s[:, joint], inputs.time_s), inputs.time_s)
         follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]
         return self._at(np.stack(follows, axis=1))
-
-    @cached_property
-    def _rate(self) -> Floats:
-        return gradient(self.trace.inputs.q_cmd_rad, self.trace.inputs.time_s)
 
     @cached_property
     def torque_Nm(self) -> Floats:

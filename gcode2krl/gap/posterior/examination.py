@@ -35,7 +35,6 @@ from gcode2krl.arrays import Bools, Floats
 from gcode2krl.effects import Applied, Effect
 from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.effect import JOINTS
-from gcode2krl.effects.inputs import gradient
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
 from gcode2krl.gap.compare.events import command_changes
@@ -265,7 +264,7 @@ def _work(trace: Trace, component: int) -> Floats:
         cuts: Floats = np.any(inputs.force_base_N[rows], axis=1).astype(np.float64)
         return cuts
     joint = JOINTS.index(trace.components[component])
-    speed: Floats = np.abs(gradient(inputs.q_cmd_rad[:, [joint]], inputs.time_s)[rows, 0])
+    speed: Floats = np.abs(inputs.rate_rad_s[rows, joint])
     return speed
 
 
@@ -570,11 +569,9 @@ class LinkData:
         likelihood = likelihood.counting(once)
         return cls(link, tuple(traces), question, known, candidates, likelihood, signatures)
 
-    def settled(self) -> "LinkData":
-        """Return the data without the columns of candidates, which only a selection needs."""
-        self.known.forget()
-        candidates = replace(self.candidates, signatures=())
-        likelihood = self.likelihood.put_away()
+    def chosen(self) -> "LinkData":
+        """Return the data without large columns, most of which a selection alone needs."""
+        candidates, likelihood = replace(self.candidates, signatures=()), self.likelihood.put_away()
         return replace(self, candidates=candidates, signatures=SignatureGram.none(), likelihood=likelihood)
 
     @property
@@ -616,6 +613,15 @@ class Examination:
     """That of all candidates, before any was accepted."""
     observable: tuple[tuple[float, float], ...] = ()
     """Of each candidate's columns: the share of their power that nuisance leaves, and that power."""
+
+    def chosen(self) -> "Examination":
+        """Return it without large columns, when nothing more is chosen."""
+        return replace(self, data=self.data.chosen())
+
+    def settled(self) -> "Examination":
+        """Return the same when no other traces are examined either."""
+        self.data.known.forget()
+        return self.chosen()
 
     @property
     def link(self) -> Link:

@@ -26,6 +26,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_array
 
@@ -434,14 +435,19 @@ class Evidence:
     flipped: Floats
     """(flips,) its log evidence where the signs of stretches are random, and ``unbounded`` with their own."""
     unbounded: float
-    signal: tuple[Floats, ...]
-    """(n, k) what it says of each trace; k = 1 where it is of one component alone."""
+    said: tuple[NDArray[np.float32], ...]
+    """(n, k) what it says of each trace; k = 1 where it is of one component alone. A link has hundreds."""
     at: tuple[int, float] | None = None
     """Run number and time of a step, or -1 and the frequency in Hz of a tone."""
     stays: bool = True
     """A step is in later runs, too."""
     in_one: float = 0.0
     """Of its gain, the share of one stretch of time at most: a sample at a sharp corner may have it all."""
+
+    @property
+    def signal(self) -> tuple[Floats, ...]:
+        """Return what it says of each trace, (n, k)."""
+        return tuple(each.astype(np.float64) for each in self.said)
 
     @property
     def key(self) -> tuple[str, Dependence]:
@@ -492,7 +498,7 @@ def evidence_of(
         inflation=gain_inflation(inverse, scores_left, fitted=0),
         flipped=log_mean(np.array(flips).T) - cost,
         unbounded=float(log_mean(np.array(owns))) - cost,
-        signal=tuple((own @ (turned @ fit.weights)).T for own in raw),
+        said=tuple((own @ (turned @ fit.weights)).T.astype(np.float32) for own in raw),
         at=at,
         in_one=_in_one(view, explained),
     )

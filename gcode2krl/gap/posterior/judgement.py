@@ -297,8 +297,7 @@ _LEAST_REST = 1e-6
 def judge(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
     """Examine a link on some traces and report on the held-out ones; without any, each held out in turn."""
     judged = _judged(link, traces, held, question)
-    examination = judged.examination
-    return replace(judged, examination=replace(examination, data=examination.data.settled()))
+    return replace(judged, examination=judged.examination.settled())
 
 
 def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question: Question) -> Judgement:
@@ -308,9 +307,10 @@ def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question
     examination, rivals, swaps = _settled(examine(link, traces, question, known))
     every = (*traces, *held)
     if not examination.causes:
-        return _with_impulses(_without_causes(examination, every))
-    families = LinkFamilies(examination, every)
+        return _with_impulses(_without_causes(examination.settled(), every))
     trials = list(_trials(examination, held, swaps))
+    examination = examination.settled()  # what families say of each cause needs as much memory again
+    families = LinkFamilies(examination, every)
     counts = range(len(examination.causes) + 1)
     if trials:
         sizes = [pooled([trial.size(count) for trial in trials]) for count in counts]
@@ -431,13 +431,16 @@ class _Trial:
 
     chosen: Examination
     held: Sequence[Trace]
-    main: Examination
+    causes: tuple[Applied, ...]
+    """What all traces say is at work."""
+    is_fold: bool
+    """Some of the traces were held out for it: what is chosen is chosen anew."""
 
     def size(self, count: int) -> Size:
         """Return the size of the held-out gap with those of its effects that are among the first causes."""
-        if count >= len(self.main.causes):
+        if count >= len(self.causes):
             return _size(self.chosen, self.held, self.chosen.causes)
-        return self.size_with(self.main.causes[:count])
+        return self.size_with(self.causes[:count])
 
     def size_with(self, named: Sequence[Applied]) -> Size:
         """Return the size of the held-out gap with those of its effects that bear these names."""
@@ -454,7 +457,7 @@ def _trials(
     ``swaps``: better rivals of what is accepted first, which take their place in each split too.
     """
     if held:
-        yield _Trial(examination, held, examination)
+        yield _Trial(examination.chosen(), held, examination.causes, is_fold=False)
         return
     power = [
         np.sum((trace.sample(examination.causes) - trace.nominal) ** 2, axis=1)
@@ -467,7 +470,7 @@ def _trials(
         for key, rival in swaps.items():
             number = next((i for i, each in enumerate(chosen.applied) if each.key == key), None)
             chosen = (None if number is None else with_rival(chosen, number, rival)) or chosen
-        yield _Trial(chosen, test, examination)
+        yield _Trial(chosen.chosen(), test, examination.causes, is_fold=True)
 
 
 # Causes and verdict
@@ -630,7 +633,7 @@ def _held_out(
     before, after = sizes[order].shrink, sizes[order + 1].shrink
     gone = max(0.0, after - before)
     applied = examination.applied[number]
-    folds = [trial for trial in trials if trial.chosen is not examination]
+    folds = [trial for trial in trials if trial.is_fold]
     agreeing = sum(applied.key in trial.chosen.accepted_keys for trial in folds)
     return HeldOut(
         agreeing / len(folds) if folds else None,

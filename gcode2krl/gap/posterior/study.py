@@ -462,26 +462,47 @@ class Study:
 
     def p_of(self, evidence: Evidence) -> float:
         """Return the same of one of its evidences."""
-        return _p(self.evidences, evidence.unbounded)
+        flipped = np.max(np.stack([each.flipped for each in self.evidences]), axis=0)
+        return _p(flipped, evidence.unbounded)
+
+
+@dataclass
+class _Asked:
+    """What families say of a view, one after the other: of each place and input the best is kept."""
+
+    best: dict[object, Evidence] = field(default_factory=dict)
+    unbounded: float = -np.inf
+    flipped: Floats = field(default_factory=lambda: np.full(_LIMITS.flips, -np.inf))
+    """(flips,) the largest of any for random signs of stretches."""
+
+    def add(self, evidences: Iterable[Evidence | None]) -> None:
+        """Take evidences; a None said nothing."""
+        for each in evidences:
+            if each is not None:
+                self.unbounded = max(self.unbounded, each.unbounded)
+                self.flipped = np.maximum(self.flipped, each.flipped)
+                known = self.best.get(each.key)
+                if known is None or each.nats > known.nats:
+                    self.best[each.key] = each
 
 
 def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> list[Study]:
     """Return what every family says of some views of the same rows."""
-    by_view: list[list[Evidence]] = [[] for _ in views]
+    asked = [_Asked() for _ in views]
     signs = [_signs(view, seed) for view in views]
     for family in grid.families():
         place = family.place
         columns = Columns(rows.of(family.columns, place.component))
-        for view, of_view, sign in zip(views, by_view, signs, strict=True):
+        for view, of_view, sign in zip(views, asked, signs, strict=True):
             at = view.at(place.component)
             every = evidence_of(at, place, family.on, family.columns, columns, family.roots, sign)
-            _add(of_view, [every, along_one(at, every, family, columns, sign)])
+            of_view.add([every, along_one(at, every, family, columns, sign)])
     for place in grid.places:
-        for of_view, evidences in zip(by_view, _searched(rows, views, place, signs), strict=True):
-            _add(of_view, evidences)
+        for of_view, evidences in zip(asked, _searched(rows, views, place, signs), strict=True):
+            of_view.add(evidences)
     return [
         _study(view, of_view, functools.partial(_moved, rows, view, grid))
-        for view, of_view in zip(views, by_view, strict=True)
+        for view, of_view in zip(views, asked, strict=True)
     ]
 
 
@@ -499,10 +520,6 @@ def _searched(
         ]
 
 
-def _add(known: list[Evidence], evidences: Sequence[Evidence | None]) -> None:
-    known += [each for each in evidences if each is not None]
-
-
 def _signs(view: View, seed: int) -> Floats:
     """Return random signs (flips, g) of the stretches of time."""
     generator = np.random.default_rng(seed)
@@ -510,32 +527,16 @@ def _signs(view: View, seed: int) -> Floats:
     return np.where(generator.random(shape) < 0.5, -1.0, 1.0)
 
 
-def _study(view: View, evidences: Sequence[Evidence], moved: Callable[[], Floats]) -> Study:
+def _study(view: View, asked: _Asked, moved: Callable[[], Floats]) -> Study:
     """Return the study: one evidence for each place and input, and p of the largest."""
-    best: dict[object, Evidence] = {}
-    for family in sorted(evidences, key=lambda evidence: -evidence.nats):
-        best.setdefault(family.key, family)
-    if not evidences:
+    if not asked.best:
         return Study(view.chi2, (), 1.0)
-    nats = max(each.unbounded for each in evidences)
-    return Study(
-        view.chi2,
-        simplest_first(best.values()),
-        _p(evidences, nats),
-        _tail_p(_largest(evidences), nats),
-        moved,
-    )
+    p, tail_p = _p(asked.flipped, asked.unbounded), _tail_p(asked.flipped, asked.unbounded)
+    return Study(view.chi2, simplest_first(asked.best.values()), p, tail_p, moved)
 
 
-def _largest(evidences: Sequence[Evidence]) -> Floats:
-    """Return the largest evidence (flips,) over all families for random signs of stretches."""
-    largest: Floats = np.max(np.stack([each.flipped for each in evidences]), axis=0)
-    return largest
-
-
-def _p(evidences: Sequence[Evidence], nats: float) -> float:
-    """Return p of an evidence, from the largest over all families for random signs of stretches."""
-    random = _largest(evidences)
+def _p(random: Floats, nats: float) -> float:
+    """Return p of an evidence, from the largest over all families (flips,) for random signs of stretches."""
     return (1.0 + float(np.sum(random >= nats))) / (1.0 + len(random))
 
 
