@@ -150,7 +150,7 @@ def moment_of(
 def _event_within(trace: Trace, span_s: Span) -> float | None:
     """Return the moment of a trace's largest event in a span, whose rows are gone; bursts are none."""
     machines = (each for each in trace.events if each.whose is not Whose.INSTRUMENT)
-    within = [each for each in machines if span_s[0] <= each.at_s <= span_s[1]]
+    within = [each for each in machines if span_s[0] <= each.span_s[1] and each.span_s[0] <= span_s[1]]
     return max(within, key=lambda each: each.power).at_s if within else None
 
 

@@ -113,10 +113,11 @@ def _widened(rows: Bools, by: int) -> Bools:
     return np.convolve(rows, np.ones(2 * by + 1), mode="same") > 0.5
 
 
-_LEAST_PULSE_ROWS = 3
-"""Of which the median is taken."""
 _SHORT_ROWS, _SHORT_TIMES = 3, 1.75
-"""Of so few rows two that are far suffice: as rare as of five, in tails of Student's t with three degrees."""
+"""Fewest rows of which the median is taken. Of these two that are far suffice: so many times as far they are
+as rare as of five, in tails of Student's t with three degrees."""
+_LEAST_ROUGH = 17
+"""Rows over which the roughness around a short pulse is told."""
 _LEAST_PULSE_AROUND = 21
 """Rows around a pulse."""
 _OF_HEIGHT = 0.25
@@ -146,12 +147,12 @@ def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bool
     high: Floats = values - median_filter(values, size=around, mode="nearest")
     pulsed = np.zeros(len(values), dtype=np.bool_)
     for width_s in _LIMITS.pulse_widths_s:
-        width = max(_rows(width_s, step_s), _LEAST_PULSE_ROWS)
+        width = max(_rows(width_s, step_s), _SHORT_ROWS)
         middle = median_filter(high, size=width, mode="nearest")
         usual = max(usual_deviation(middle), least)
         if usual > 0.0:
-            # half of which a pulse's own edges, that fourth differences widen, do not fill
-            rough = _roughness(high, 2 * (width + len(_WEIGHTS)) + 1)
+            # a short pulse's own edges, that fourth differences widen, must not fill half of it
+            rough = _roughness(high, max(2 * width + 1, _LEAST_ROUGH))
             times = _LIMITS.pulse_deviations * (_SHORT_TIMES if width <= _SHORT_ROWS else 1.0)
             far = np.abs(middle) > times * usual * rough
             height = maximum_filter1d(np.where(far, np.abs(middle), 0.0), width)
