@@ -34,6 +34,7 @@ spindle that turns at that speed, and then nothing is taken off.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -114,17 +115,27 @@ def _widened(rows: Bools, by: int) -> Bools:
 
 
 _SHORT_ROWS, _SHORT_TIMES = 3, 1.75
-"""Fewest rows of which the median is taken. Of these two that are far suffice: so many times as far they are
-as rare as of five, in tails of Student's t with three degrees."""
-_LEAST_ROUGH = 17
-"""Rows over which the roughness around a short pulse is told."""
+"""Rows of which two that are far suffice for a median: so many times as far they are as rare as of five, in
+tails of Student's t with three degrees."""
+
+
+class Fewest(NamedTuple):
+    """Fewest rows of which a pulse's median is taken, and of which its surroundings' roughness."""
+
+    pulse: int
+    rough: int
+
+
+OF_TABLE, OF_ENCODERS = Fewest(_SHORT_ROWS, 17), Fewest(5, 11)
+"""A short blow's own edges, that fourth differences widen, must not fill half of its surroundings; a servo is
+off for three rows, and rough around, where the command jerks."""
 _LEAST_PULSE_AROUND = 21
 """Rows around a pulse."""
 _OF_HEIGHT = 0.25
 """Rows that are off by less of a pulse's height are beside it."""
 
 
-def pulse_rows(time_s: Floats, values: Floats, least: Floats) -> Bools:
+def pulse_rows(time_s: Floats, values: Floats, least: Floats, fewest: Fewest = OF_TABLE) -> Bools:
     """Return which rows (n,) of values (n, k) are in a pulse of any component.
 
     ``least`` (k,): rms of rounding to the last decimal. A component with many pulses has none: so it is. Rows
@@ -135,24 +146,23 @@ def pulse_rows(time_s: Floats, values: Floats, least: Floats) -> Bools:
     around = max(_rows(_LIMITS.pulse_around_s, step_s), _LEAST_PULSE_AROUND)
     for column, smallest in zip(values.T, least.tolist(), strict=True):
         if len(column) > around:
-            is_pulse = _of_column(column, step_s, around, smallest)
+            is_pulse = _of_column(column, step_s, around, smallest, fewest)
             if np.mean(is_pulse) <= _LIMITS.bursts_most:
                 pulsed |= is_pulse
     return pulsed
 
 
-def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bools:
+def _of_column(values: Floats, step_s: float, around: int, least: float, fewest: Fewest) -> Bools:
     from scipy.ndimage import maximum_filter1d, median_filter
 
     high: Floats = values - median_filter(values, size=around, mode="nearest")
     pulsed = np.zeros(len(values), dtype=np.bool_)
     for width_s in _LIMITS.pulse_widths_s:
-        width = max(_rows(width_s, step_s), _SHORT_ROWS)
+        width = max(_rows(width_s, step_s), fewest.pulse)
         middle = median_filter(high, size=width, mode="nearest")
         usual = max(usual_deviation(middle), least)
         if usual > 0.0:
-            # a short pulse's own edges, that fourth differences widen, must not fill half of it
-            rough = _roughness(high, max(2 * width + 1, _LEAST_ROUGH))
+            rough = _roughness(high, max(2 * width + 1, fewest.rough))
             times = _LIMITS.pulse_deviations * (_SHORT_TIMES if width <= _SHORT_ROWS else 1.0)
             far = np.abs(middle) > times * usual * rough
             height = maximum_filter1d(np.where(far, np.abs(middle), 0.0), width)
@@ -381,7 +391,8 @@ def _stretches(trace: Trace, calm: Floats) -> Iterator[_Stretch]:
     if not _is_asked(trace):
         return
     least = np.array([resolution(column) for column in trace.measured.T])
-    pulsed = pulse_rows(trace.time_s, calm, least) & ~_is_edge(trace, calm)
+    fewest = OF_ENCODERS if trace.link.of_joints else OF_TABLE
+    pulsed = pulse_rows(trace.time_s, calm, least, fewest) & ~_is_edge(trace, calm)
     rough = pulsed | loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
     rows = np.flatnonzero(rough)
     if not len(rows):
