@@ -72,7 +72,7 @@ def told(values, one, *, is_smooth=False):
 def test_what_acts_for_moments_is_told_with_its_largest_and_what_lasts_is_not():
     one = trace(noisy(), "mechanics", number=1)
     peaks = np.zeros((500, 3))
-    peaks[[120, 121, 340], 1] = 1.0, 1.5, -1.2
+    peaks[[120, 121, 122, 340], 1] = 1.0, -1.5, 1.0, 1.2
     found = told(peaks, one)
     assert (found.run, found.line) == ("run-2", 121)
     assert found.t_s == pytest.approx(one.time_s[121])
