@@ -299,8 +299,11 @@ def _is_at(run: str | None, t_s: float, true: dict[str, Any]) -> bool:
 def told_moments(result: dict[str, Any]) -> Iterator[Moment]:
     """Yield the moments that an answer tells."""
     for cause in result["causes"]:
-        yield from _moments(cause, cause.get("run"))
-        yield from _moments(cause.get("parameters") or {}, cause.get("run"))
+        moment = cause.get("moment")
+        if moment:  # parameters count from the start of the earliest run
+            yield from _moments(moment, moment["run"])
+        else:
+            yield from _moments(cause.get("parameters") or {}, cause.get("run"))
     for each in result["unexplained"].get("depends_on") or ():
         yield from _moments(each, each.get("run"))
 

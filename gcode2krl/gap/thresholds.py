@@ -512,6 +512,10 @@ class PosteriorThresholds:
         "what runs moved in time do not have: by the force sound links have 34 and 101",
     )
 
+    excursion_widths_s: tuple[float, ...] = convention(
+        (0.1, 0.14, 0.2, 0.28, 0.4),
+        "over which what goes one way is no noise of an instrument: what lasts longer its wander imitates",
+    )
     form_error: float = convention(
         0.01, "of its amplitude: no form of an effect, and no robot, is known better; less is no gap"
     )
@@ -811,6 +815,9 @@ class AnswerThresholds:
         2.0, "standard deviations of a mean at a reference point: less is told as nothing"
     )
     parted_odds: float = convention(3.0, "expected odds below which a program is said to part nothing")
+    moments_share: float = convention(
+        0.05, "of the time: what has half of its power in less is told with the moment of its largest"
+    )
     impulse_probability: float = convention(
         0.95, "of an impulse that no noise makes, that it is what happened at its place"
     )

@@ -76,6 +76,8 @@ def test_what_errs_alike_in_all_joints_is_told_of_all():
         ([cause("step", at_s={"value": 11.82})], (), True),
         ([cause("step", at_s={"value": 11.9})], (), False),
         ([cause("step", at_s={"value": 11.8}) | {"run": "run-1"}], (), False),
+        ([cause("step", at_s={"value": 3611.8}) | {"moment": {"run": "run-2", "t_s": 11.81}}], (), True),
+        ([cause("step", at_s={"value": 11.8}) | {"moment": {"run": "run-2", "t_s": 9.0}}], (), False),
         ((), [depends() | {"run": "run-2", "t_s": 11.775}], True),
         ((), [depends() | {"at_time_s": 3596.0}], False),
         ((), (), False),

@@ -122,6 +122,32 @@ def test_a_blow_is_an_impulse_with_moment_and_size():
     assert not np.any((found.time_s > 7.21) & (found.time_s < 7.27))
 
 
+def test_a_blow_is_seen_between_rows_that_are_left_out():
+    """Where a cutter goes in and out the force is in short pieces; a blow of three rows is in one of them."""
+    kept = np.arange(COUNT) % 32 < 24
+    y = noise(COUNT, 8)[:, 0] + blow(7.18, 200.0, 0.03)
+    edges = np.flatnonzero(np.diff(kept, prepend=False, append=False)).reshape(-1, 2)
+    lengths = np.cumsum([0, *(edges[:, 1] - edges[:, 0])])
+    (whole,) = runs(y, link="force")
+    pieces = replace(
+        whole,
+        time_s=whole.time_s[kept],
+        measured=whole.measured[kept],
+        segments=np.stack([lengths[:-1], lengths[1:]], axis=1),
+    )
+    (found,) = sorted_out([pieces], {})
+    (event,) = found.events
+    assert event.whose is Whose.IMPULSE
+    assert event.at_s == pytest.approx(7.195, abs=0.01)
+
+
+def test_the_moment_of_a_pull_that_ends_at_once_is_its_end():
+    pull = np.where((TIME_S > 7.14) & (TIME_S < 7.24), (TIME_S - 7.14) / 0.1, 0.0)
+    (found,) = sorted_out(runs(noise(COUNT, 8)[:, 0] + 90.0 * pull), {})
+    (event,) = found.events
+    assert event.at_s == pytest.approx(7.24, abs=0.015)
+
+
 def test_a_blow_that_leaves_a_step_behind_is_a_slip_and_a_step_alone_keeps_its_rows():
     step = 30.0 * (TIME_S > 7.24)
     hit, *_ = sorted_out(runs(noise(COUNT, 9)[:, 0] + blow(7.2, 90.0) + step), {})

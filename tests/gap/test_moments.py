@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import library
+from gcode2krl.gap.answer.causes import moment_of
+from gcode2krl.gap.compare.jumps import jumps, strongest_moments
+from gcode2krl.gap.compare.trace import Event, Whose
 from gcode2krl.gap.components import Signatures, blocks_from
-from gcode2krl.gap.noise.source import jumps, strongest_moments
 from gcode2krl.gap.posterior.least_squares import free_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import stub, trace
@@ -61,6 +63,39 @@ def test_moments_count_from_the_start_of_the_earliest_run():
 
 def test_a_short_trace_has_none():
     assert strongest_moments([trace(noisy(rows=20) + at(10, 1.0, 20), "mechanics")], 0.0, 1e6) == ()
+
+
+def told(values, one, *, is_smooth=False):
+    return moment_of([trace(noisy(2), "mechanics"), one], [np.zeros((500, 3)), values], is_smooth=is_smooth)
+
+
+def test_what_acts_for_moments_is_told_with_its_largest_and_what_lasts_is_not():
+    one = trace(noisy(), "mechanics", number=1)
+    peaks = np.zeros((500, 3))
+    peaks[[120, 121, 122, 340], 1] = 1.0, -1.5, 1.0, 1.2
+    found = told(peaks, one)
+    assert (found.run, found.line) == ("run-2", 121)
+    assert found.t_s == pytest.approx(one.time_s[121])
+    assert told(np.sin(one.time_s)[:, None] * np.ones(3), one) is None
+
+
+def test_the_moment_of_a_smooth_function_is_where_the_residual_jumps_near_it():
+    """A pull that grows and ends at once: the function of time that follows it is largest too early."""
+    rows = np.arange(500)
+    pull = np.where((rows >= 200) & (rows < 230), (rows - 200) / 30.0, 0.0)[:, None] * [1.0, 0.3, 0.1]
+    one = trace(noisy() + pull, "mechanics", number=1)
+    smooth = np.exp(-0.5 * ((rows - 218) / 10.0) ** 2)[:, None] * [0.7, 0.2, 0.1]
+    assert told(smooth, one, is_smooth=True).t_s == pytest.approx(one.time_s[229] + 0.01)
+    assert told(smooth, trace(noisy(), "mechanics"), is_smooth=True).t_s == pytest.approx(one.time_s[218])
+
+
+def test_the_moment_of_a_smooth_function_is_that_of_an_event_whose_rows_are_gone():
+    rows = np.arange(500)
+    smooth = np.exp(-0.5 * ((rows - 218) / 10.0) ** 2)[:, None] * np.ones(3)
+    hit = Event("mechanics", "run-2", Whose.SLIP, (4.2, 4.7), 4.61, 9, np.ones(3), np.ones(3), 5.0)
+    burst = replace(hit, whose=Whose.INSTRUMENT, at_s=4.4, power=9.0)
+    one = trace(noisy(), "mechanics", number=1, events=(hit, burst))
+    assert told(smooth, one, is_smooth=True).t_s == 4.61
 
 
 def test_blocks_of_a_step_stand_at_the_moments_and_count_what_was_looked_at():

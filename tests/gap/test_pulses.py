@@ -13,7 +13,7 @@ STATED = 0.01
 
 def of(values, step_s, least=0.0):
     time_s = step_s * np.arange(len(values))
-    return pulse_rows(time_s, values[:, None], np.array([[0, len(values)]]), np.array([least]))
+    return pulse_rows(time_s, values[:, None], np.array([least]))
 
 
 def drawn(kind, count, step_s, generator):
@@ -42,13 +42,16 @@ def test_noise_of_any_kind_hardly_ever_has_one(kind):
     assert alarms <= 1 + STATED * draws
 
 
-@pytest.mark.parametrize(("step_s", "lasts_s"), [(0.004, 0.03), (0.004, 0.06), (0.008, 0.06)])
-def test_a_blow_is_found_where_it_is(step_s, lasts_s):
+@pytest.mark.parametrize(
+    ("step_s", "lasts_s", "height"),
+    [(0.004, 0.03, 40.0), (0.004, 0.06, 40.0), (0.008, 0.06, 40.0), (0.008, 0.03, 150.0)],
+)
+def test_a_blow_is_found_where_it_is(step_s, lasts_s, height):
     time_s = step_s * np.arange(round(SECONDS / step_s))
     for seed in range(10):
         values = drawn("short", len(time_s), step_s, np.random.default_rng(seed))
         since = (time_s - 7.3) / lasts_s
-        values += 40.0 * np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
+        values += height * np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
         found = time_s[of(values, step_s)]
         assert len(found)
         assert 7.3 - step_s < found.mean() < 7.3 + lasts_s + step_s

@@ -35,10 +35,11 @@ from gcode2krl.gap.answer.words import AXES, FORCE_AXES, listed, number
 from gcode2krl.gap.compare.events import line_at
 from gcode2krl.gap.compare.inputs import Admissible
 from gcode2krl.gap.compare.interpolation import nearest_rows, step_of
+from gcode2krl.gap.compare.jumps import jump_within
 from gcode2krl.gap.compare.links import MECHANICS, TIMING
 from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.slips import Slip
-from gcode2krl.gap.compare.trace import Context, Trace, Whose
+from gcode2krl.gap.compare.trace import Context, Span, Trace, Whose
 from gcode2krl.gap.noise.source import are_repeats, is_revisited
 from gcode2krl.gap.posterior.calibrated import FamilyProbability, family_probabilities
 from gcode2krl.gap.posterior.cause_tests import Interval
@@ -99,15 +100,18 @@ def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] =
         form_fits=None if cause.tests is None else cause.tests.form_ratio,
         family_probability=cause.family_probability,
         tests=None if cause.features is None else cause.features.as_dict(),
-        moment=_moment(cause, pairs),
+        moment=_moment(cause, judgement, pairs),
     )
 
 
-def _moment(cause: Cause, pairs: Sequence[Pair]) -> MomentResult | None:
-    """Return the moment at which a cause begins, in the run that it is in; None where it has none."""
+def _moment(cause: Cause, judgement: Judged, pairs: Sequence[Pair]) -> MomentResult | None:
+    """Return the moment at which a cause begins or, of what acts for moments, at which it does most."""
     moment = cause.applied.effect.moment
     if moment is None:
-        return None
+        if not isinstance(judgement, Judgement) or cause.applied.effect.plans_anew:
+            return None
+        traces = judgement.traces
+        return moment_of(traces, [trace.sample((cause.applied,)) - trace.nominal for trace in traces])
     at_s = cause.applied[moment.name]
     for pair in pairs:
         times_s = pair.inputs.run_hours * S_PER_H
@@ -115,6 +119,44 @@ def _moment(cause: Cause, pairs: Sequence[Pair]) -> MomentResult | None:
             t_s = float(np.interp(at_s, times_s, pair.inputs.time_s))
             return MomentResult(run=pair.name, t_s=t_s, line=line_at(pair.inputs, t_s))
     return None
+
+
+_SWING_S = 0.025
+"""Two cycles of an interpolator: what swings to and fro so quickly has its moment between."""
+
+
+def moment_of(
+    traces: Sequence[Trace], signals: Sequence[Floats], *, is_smooth: bool = False
+) -> MomentResult | None:
+    """Return where a deviation (n, k) of each trace is largest; None where it is not one of moments.
+
+    Half of its power then lies in a small share of the time. Of a smooth function it is where the residual
+    has an event near there, or jumps, if it does.
+    """
+    powers = [np.sum(signal**2, axis=1) for signal in signals]
+    ranked = np.cumsum(np.sort(np.concatenate(powers))[::-1])
+    if traces[0].still or np.searchsorted(ranked, 0.5 * ranked[-1]) > _LIMITS.moments_share * len(ranked):
+        return None
+    number = int(np.argmax([power.max() for power in powers]))
+    trace, power = traces[number], powers[number]
+    row = int(np.argmax(power))
+    near = np.abs(trace.time_s - trace.time_s[row]) <= _SWING_S
+    at_s = float(power[near] @ trace.time_s[near] / power[near].sum())
+    if is_smooth:
+        low = np.flatnonzero(power < power[row] / 4.0)
+        first, last = (low[low < row].max(initial=0), low[low > row].min(initial=len(power) - 1))
+        first_s, last_s = (float(each) for each in trace.time_s[[first, last]])
+        wide_s = (last_s - first_s) / 2.0
+        span_s = first_s - wide_s, last_s + wide_s
+        at_s = _event_within(trace, span_s) or jump_within(trace, span_s) or at_s
+    return MomentResult(run=trace.run, t_s=at_s, line=line_at(trace.inputs, at_s))
+
+
+def _event_within(trace: Trace, span_s: Span) -> float | None:
+    """Return the moment of a trace's largest event in a span, whose rows are gone; bursts are none."""
+    machines = (each for each in trace.events if each.whose is not Whose.INSTRUMENT)
+    within = [each for each in machines if span_s[0] <= each.span_s[1] and each.span_s[0] <= span_s[1]]
+    return max(within, key=lambda each: each.power).at_s if within else None
 
 
 def _unknown(cause: Cause) -> Iterator[UnknownAt]:
@@ -293,7 +335,10 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         signals = tuple(_in_base(trace, own) for trace, own in zip(traces, signals, strict=True))
     largest = _largest(signals)
     along = largest if is_step else _main_axis(signals)
-    moment = evidence.at if is_step else None
+    moment = moment_of(traces, evidence.signal, is_smooth=True)
+    if is_step and evidence.at is not None:
+        stepped, at_s = traces[evidence.at[0]], evidence.at[1]
+        moment = MomentResult(run=stepped.run, t_s=at_s, line=line_at(stepped.inputs, at_s))
     length = float(np.linalg.norm(along))
     is_scalar = signals[0].shape[1] == 1
     course = None
@@ -310,10 +355,10 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         place_probability=family.place_probability,
         share=family.features.share,
         tests=family.features.as_dict(),
-        at_time_s=None if moment is None else moment[1],
-        run=None if moment is None else traces[moment[0]].run,
+        at_time_s=None if moment is None else moment.t_s,
+        run=None if moment is None else moment.run,
         in_later_runs=evidence.stays if is_step else None,
-        line=None if moment is None else line_at(traces[moment[0]].inputs, moment[1]),
+        line=None if moment is None else moment.line,
         size=judgement.factor * float(np.linalg.norm(largest)),
         unit=judgement.link.unit,
         direction=tuple((along / length).tolist()) if is_vector and length > 0.0 else None,

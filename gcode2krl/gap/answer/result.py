@@ -335,7 +335,8 @@ class DependsOnResult:
     share: float
     """Of the gap's power beyond noise that it takes."""
     at_time_s: float | None = None
-    """Of a step or an impulse, its moment in `run`; in the JSON object ``t_s`` too."""
+    """Of a step or an impulse its moment in `run`, of what is one of moments its largest; in the JSON object
+    ``t_s`` too."""
     run: str | None = None
     in_later_runs: bool | None = None
     """Of a step, whether it stays: between runs somebody may have mended it."""
@@ -424,7 +425,7 @@ class CauseResult:
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`calibrated.Features`); None where not tested."""
     moment: MomentResult | None = None
-    """Of what begins at a moment: where that is in its run."""
+    """Of what begins at a moment, where that is in its run; of what acts for moments, its largest."""
 
     @property
     def is_named(self) -> bool:

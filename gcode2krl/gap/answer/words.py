@@ -119,7 +119,8 @@ def describe(cause: CauseResult, most: int | None = None) -> str:
     moment = cause.moment
     numbers = _numbers({k: v for k, v in cause.parameters.items() if moment is None or k != "at_s"})
     if moment is not None:
-        numbers.insert(0, f"at {moment.t_s:.2f} s of {moment.run}, line {moment.line}")
+        when = "at" if "at_s" in cause.parameters else "most at"
+        numbers.insert(0, f"{when} {moment.t_s:.2f} s of {moment.run}, line {moment.line}")
     if most is not None and len(numbers) > most:
         numbers = []
     return ", ".join([named(cause.effect, cause.target), *numbers])
@@ -181,7 +182,8 @@ def happened(event: EventResult) -> str:
 
 def depends(dependence: DependsOnResult) -> str:
     """Return where a gap is and on what it depends: ``tip, a step from 11.2 s of run-1 on``."""
-    return ", ".join([_place(dependence), _form(dependence), *_size(dependence), *_course(dependence)])
+    words = [_place(dependence), _form(dependence), *_size(dependence), *_most_at(dependence)]
+    return ", ".join([*words, *_course(dependence)])
 
 
 def what_there_is(dependence: DependsOnResult) -> str:
@@ -224,6 +226,13 @@ def _form(dependence: DependsOnResult) -> str:
     if dependence.frequency_hz is not None:
         return f"a tone of {number(dependence.frequency_hz)} Hz"
     return _FORMS.get(dependence.form, "a function of {on}").format(on=dependence.on)
+
+
+def _most_at(dependence: DependsOnResult) -> list[str]:
+    """Return when it is largest, of what is one of moments but no step or impulse."""
+    if dependence.form in ("step", IMPULSE) or dependence.at_time_s is None:
+        return []
+    return [f"most at {dependence.at_time_s:.2f} s of {dependence.run}, line {dependence.line}"]
 
 
 def _size(dependence: DependsOnResult) -> list[str]:

@@ -34,6 +34,7 @@ spindle that turns at that speed, and then nothing is taken off.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,43 +114,57 @@ def _widened(rows: Bools, by: int) -> Bools:
     return np.convolve(rows, np.ones(2 * by + 1), mode="same") > 0.5
 
 
-_LEAST_PULSE_ROWS = 5
-"""Of which the median is taken: of three rows heavy tails move it."""
-_FOURTH = (1.0, -4.0, 6.0, -4.0, 1.0)
+_SHORT_ROWS, _SHORT_TIMES = 3, 1.75
+"""Rows of which two that are far suffice for a median: so many times as far they are as rare as of five, in
+tails of Student's t with three degrees."""
+
+
+class Fewest(NamedTuple):
+    """Fewest rows of which a pulse's median is taken, and of which its surroundings' roughness."""
+
+    pulse: int
+    rough: int
+
+
+OF_TABLE, OF_ENCODERS = Fewest(_SHORT_ROWS, 17), Fewest(5, 11)
+"""A short blow's own edges, that fourth differences widen, must not fill half of its surroundings; a servo is
+off for three rows, and rough around, where the command jerks."""
+_LEAST_PULSE_AROUND = 21
+"""Rows around a pulse."""
 _OF_HEIGHT = 0.25
 """Rows that are off by less of a pulse's height are beside it."""
 
 
-def pulse_rows(time_s: Floats, values: Floats, segments: Ints, least: Floats) -> Bools:
+def pulse_rows(time_s: Floats, values: Floats, least: Floats, fewest: Fewest = OF_TABLE) -> Bools:
     """Return which rows (n,) of values (n, k) are in a pulse of any component.
 
-    ``least`` (k,): rms of rounding to the last decimal. A component with many pulses has none: so it is.
+    ``least`` (k,): rms of rounding to the last decimal. A component with many pulses has none: so it is. Rows
+    that are left out, as where the predicted force jumps, do not part what is far off from its level.
     """
     pulsed = np.zeros(len(values), dtype=np.bool_)
     step_s = usual_step_s(time_s) if len(time_s) > 1 else 1.0
-    around = max(_rows(_LIMITS.pulse_around_s, step_s), 4 * _LEAST_PULSE_ROWS + 1)
+    around = max(_rows(_LIMITS.pulse_around_s, step_s), _LEAST_PULSE_AROUND)
     for column, smallest in zip(values.T, least.tolist(), strict=True):
-        is_pulse = np.zeros(len(values), dtype=np.bool_)
-        for first, last in segments:
-            if last - first > around:
-                is_pulse[first:last] = _of_column(column[first:last], step_s, around, smallest)
-        if np.mean(is_pulse) <= _LIMITS.bursts_most:
-            pulsed |= is_pulse
+        if len(column) > around:
+            is_pulse = _of_column(column, step_s, around, smallest, fewest)
+            if np.mean(is_pulse) <= _LIMITS.bursts_most:
+                pulsed |= is_pulse
     return pulsed
 
 
-def _of_column(values: Floats, step_s: float, around: int, least: float) -> Bools:
+def _of_column(values: Floats, step_s: float, around: int, least: float, fewest: Fewest) -> Bools:
     from scipy.ndimage import maximum_filter1d, median_filter
 
     high: Floats = values - median_filter(values, size=around, mode="nearest")
     pulsed = np.zeros(len(values), dtype=np.bool_)
     for width_s in _LIMITS.pulse_widths_s:
-        width = max(_rows(width_s, step_s), _LEAST_PULSE_ROWS)
+        width = max(_rows(width_s, step_s), fewest.pulse)
         middle = median_filter(high, size=width, mode="nearest")
         usual = max(usual_deviation(middle), least)
         if usual > 0.0:
-            rough = _roughness(high, 2 * width + 1)
-            far = np.abs(middle) > _LIMITS.pulse_deviations * usual * rough
+            rough = _roughness(high, max(2 * width + 1, fewest.rough))
+            times = _LIMITS.pulse_deviations * (_SHORT_TIMES if width <= _SHORT_ROWS else 1.0)
+            far = np.abs(middle) > times * usual * rough
             height = maximum_filter1d(np.where(far, np.abs(middle), 0.0), width)
             pulsed |= (height > 0.0) & (np.abs(high) > _OF_HEIGHT * height)
     return pulsed
@@ -162,7 +177,7 @@ def _roughness(values: Floats, around: int) -> Floats:
     """
     from scipy.ndimage import median_filter
 
-    rough = np.abs(np.convolve(values, _FOURTH, mode="same"))
+    rough = np.abs(np.convolve(values, _WEIGHTS, mode="same"))
     local: Floats = median_filter(rough, size=around, mode="nearest")
     return np.maximum(local / max(float(np.median(rough)), 1e-300), 1.0)
 
@@ -376,7 +391,8 @@ def _stretches(trace: Trace, calm: Floats) -> Iterator[_Stretch]:
     if not _is_asked(trace):
         return
     least = np.array([resolution(column) for column in trace.measured.T])
-    pulsed = pulse_rows(trace.time_s, calm, trace.segments, least) & ~_is_edge(trace, calm)
+    fewest = OF_ENCODERS if trace.link.of_joints else OF_TABLE
+    pulsed = pulse_rows(trace.time_s, calm, least, fewest) & ~_is_edge(trace, calm)
     rough = pulsed | loud_rows(trace.time_s, trace.residual, trace.segments, trace.nominal)
     rows = np.flatnonzero(rough)
     if not len(rows):
@@ -594,13 +610,17 @@ class _Levels:
         self.trace, self._rest = trace, calm
 
     def event(self, stretch: _Stretch, whose: Whose, change: Floats) -> Event:
-        """Return the event of a stretch."""
+        """Return the event of a stretch; its moment is where the rest changes, weighed by how much."""
         time_s = self.trace.time_s[stretch.first : stretch.last]
         around = 0.5 * (self._level(stretch.first, -1) + self._level(stretch.last, 1))
         off = self._rest[stretch.first : stretch.last] - around
         squares = np.sum(off**2, axis=1)
-        middle_s = float(squares @ time_s) / max(float(squares.sum()), 1e-300)
-        at_s = middle_s if whose is Whose.IMPULSE else float(time_s[0] + time_s[-1]) / 2.0
+        at_s = float(time_s[0] + time_s[-1]) / 2.0
+        if whose is not Whose.INSTRUMENT:
+            rows = slice(max(stretch.first - 1, 0), stretch.last + 1)
+            changes = np.sum(np.diff(self._rest[rows], axis=0) ** 2, axis=1)
+            between_s = 0.5 * (self.trace.time_s[rows][1:] + self.trace.time_s[rows][:-1])
+            at_s = float(changes @ between_s) / max(float(changes.sum()), 1e-300)
         return Event(
             link=self.trace.link.name,
             run=self.trace.run,

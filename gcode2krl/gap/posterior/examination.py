@@ -39,12 +39,12 @@ from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
 from gcode2krl.gap.compare.events import command_changes
 from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s, values_of
+from gcode2krl.gap.compare.jumps import strongest_moments
 from gcode2krl.gap.compare.links import SIGNALS
 from gcode2krl.gap.compare.trace import Context, Link, Trace, stretches_of, stretches_of_all
 from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_from, blocks_of, strongest_hz
 from gcode2krl.gap.noise.nuisance import Candidates, Nuisance, NuisanceDesign, Question, nuisance_for
 from gcode2krl.gap.noise.short import Noise
-from gcode2krl.gap.noise.source import strongest_moments
 from gcode2krl.gap.posterior.gram import Gram, SignatureGram
 from gcode2krl.gap.posterior.least_squares import Fitted, Numbers, Shortened, gauss_newton
 from gcode2krl.gap.posterior.likelihood import Key, Likelihood, once_among
@@ -364,6 +364,12 @@ def fitted_mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> tupl
         for chosen in (~is_shared, is_shared)
     )
     return by_run, shared
+
+
+def unexplained_by_mismatch(likelihood: Likelihood, residuals: Sequence[Floats]) -> list[Floats]:
+    """Return residuals (n, k) less what normal mismatch adds to each."""
+    by_run, shared = fitted_mismatch(likelihood, residuals)
+    return _less(_less(residuals, by_run), shared)
 
 
 def _deviation(

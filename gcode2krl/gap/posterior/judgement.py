@@ -43,9 +43,17 @@ from gcode2krl.gap.posterior.cause_tests import (
     constancy_of,
     intervals_of,
 )
-from gcode2krl.gap.posterior.examination import Examination, Size, fitted_signal, pooled, size_of_gap
+from gcode2krl.gap.posterior.examination import (
+    Examination,
+    Size,
+    fitted_signal,
+    pooled,
+    size_of_gap,
+    unexplained_by_mismatch,
+)
+from gcode2krl.gap.posterior.excursions import with_excursions
 from gcode2krl.gap.posterior.families import Evidence
-from gcode2krl.gap.posterior.likelihood import Key, refit
+from gcode2krl.gap.posterior.likelihood import Key, Likelihood, refit
 from gcode2krl.gap.posterior.selection import Rival, examine, rival_probabilities, rivals_of, with_rival
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -307,7 +315,7 @@ def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question
     examination, rivals, swaps = _settled(examine(link, traces, question, known))
     every = (*traces, *held)
     if not examination.causes:
-        return _with_impulses(_without_causes(examination.settled(), every))
+        return _with_impulses(_with_excursions(_without_causes(examination.settled(), every)))
     trials = list(_trials(examination, held, swaps))
     examination = examination.settled()  # what families say of each cause needs as much memory again
     families = LinkFamilies(examination, every)
@@ -320,7 +328,8 @@ def _judged(link: Link, traces: Sequence[Trace], held: Sequence[Trace], question
     judged = _judgement(examination, sizes, whole, families, trials, rivals)
     with_named = _size_with_named(judged, sizes, trials)
     judged = replace(judged, every=every, size_with_named=with_named)
-    return _with_impulses(judged if judged.verdict != "explained" else _beside_its_rest(judged, whole))
+    judged = judged if judged.verdict != "explained" else _beside_its_rest(judged, whole)
+    return _with_impulses(_with_excursions(judged))
 
 
 def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Rival]], dict[Key, Applied]]:
@@ -340,6 +349,19 @@ def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Riva
             return examination, rivals, swaps
         swaps[examination.applied[number].key] = best.applied
         examination = swapped
+
+
+def _with_excursions(judged: Judgement) -> Judgement:
+    """Return the judgement; where there is no gap, with what moves its signal one way in few stretches."""
+    if judged.verdict != "no_gap":
+        return judged
+    examination = judged.examination
+    nuisance = nuisance_for(judged.every, examination.question, examination.data.known)
+    likelihood = Likelihood(judged.every, nuisance, examination.noise)
+    rests = unexplained_by_mismatch(
+        likelihood, [trace.measured - trace.sample(judged.usual) for trace in judged.every]
+    )
+    return replace(judged, every=with_excursions(likelihood, rests))
 
 
 def _with_impulses(judged: Judgement) -> Judgement:

@@ -14,7 +14,8 @@ evidence is larger by a share worth naming; what each run does over time is the 
 explains the rest, their signs are arbitrary; the largest evidence over all families with signs drawn at
 random is what the largest one has to exceed; for a gap by the Gumbel distribution of the flips. Few strong
 stretches have few signs: there the evidence alone must be beyond what models of sound machines are off by.
-What happens once, in a few rows, has a null of its own (`gcode2krl.gap.compare.events`).
+What happens once, in a few rows, has a null of its own (`gcode2krl.gap.compare.events`), and so has what
+moves a signal for tenths of a second (`gcode2krl.gap.posterior.excursions`).
 """
 
 import functools
