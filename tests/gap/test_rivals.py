@@ -1,5 +1,7 @@
 """Rivals: effects that do the same share one probability; others share what it leaves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,26 @@ def test_a_similar_effect_is_worse_by_what_it_cannot_explain():
 def test_an_effect_that_explains_nothing_of_it_is_no_rival():
     _, found = with_rivals([wave(2.0), wave(3.0)], 2.0 * SIGMA * np.sin(2.0 * np.pi * 2.0 * TIME_S))
     assert found == {}
+
+
+class WithMore(Added):
+    """A wave with a smaller one beside it, which is not there unless the data show it."""
+
+    def __init__(self, name, hz, more_hz):
+        super().__init__(name, wave(hz).form)
+        self.more = wave(more_hz).form
+        (size,) = self.parameters
+        self.parameters = (size, replace(size, name="more_rad", minor=True))
+
+    def servo(self, q_act_rad, inputs, applied):
+        q = super().servo(q_act_rad, inputs, applied)
+        q[:, 0] += applied["more_rad"] * self.more(inputs.time_s)
+        return q
+
+
+def test_a_rival_pays_for_no_number_that_the_data_do_not_show():
+    cause, other = WithMore("cause", 2.0, 3.0), WithMore("other", 2.0, 5.0)
+    _, found = with_rivals([cause, other], 2.0 * SIGMA * cause.form(TIME_S))
+    (rival_,) = found.values()
+    assert rival_.applied["more_rad"] == 0.0
+    assert rival_.cost_difference == pytest.approx(0.0, abs=1e-3)

@@ -618,6 +618,7 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
         fitted = refit(examination.likelihood, (*others, start), steps=_STEPS, scan=bent)
         if fitted.at_bound[-1] or not np.isfinite(fitted.chi2):
             continue
+        fitted = with_shown_numbers(examination, fitted)  # as the cause that it is compared with
         difference = (fitted.chi2 - examination.fitted.chi2) / spread
         cost = difference + fitted.occam - examination.fitted.occam
         apart = examination.likelihood.residual(fitted.applied) - residual
