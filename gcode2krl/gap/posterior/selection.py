@@ -25,13 +25,13 @@ import numpy as np
 from scipy import special
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects import Applied, Inputs
+from gcode2krl.effects import Applied, Effect, Inputs
 from gcode2krl.gap.compare.trace import Link, Trace
 from gcode2krl.gap.components import Block, Signatures
 from gcode2krl.gap.noise.nuisance import Candidates, Column, Question, nuisance_for
 from gcode2krl.gap.noise.short import Noise
 from gcode2krl.gap.noise.source import noise_of, noise_of_poses
-from gcode2krl.gap.posterior.examination import Examination, LinkData, fitted_mismatch, moments_off
+from gcode2krl.gap.posterior.examination import Examination, LinkData, acts, fitted_mismatch, moments_off
 from gcode2krl.gap.posterior.gram import Gram, solve
 from gcode2krl.gap.posterior.least_squares import Fitted
 from gcode2krl.gap.posterior.likelihood import Key, Sensitivity, refit, searched, sensitivity_of
@@ -543,27 +543,44 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
 
 
 def _pruned(examination: Examination) -> Examination:
-    """Return the examination without effects that bring little of the whole gain where they act.
+    """Return the examination without effects that the others may be off by, or that they have made needless.
 
-    An effect of one joint is compared with the gain in that joint.
+    However large another effect is, a small one stays where it is surprising beside all others, and brings
+    more than the models of these are off by where it acts.
     """
-    before = examination.likelihood.residual(()) if len(examination.applied) > 1 else np.zeros(0)
     while len(examination.applied) > 1:
-        after = examination.likelihood.residual(examination.applied)
-        refits = [
-            refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
-            for number in range(len(examination.applied))
-        ]
-        shares = []
-        for number, refitted in enumerate(refits):
-            rows = np.flatnonzero(examination.rows_changed(number))
-            whole = float(np.sum(before[rows] ** 2) - np.sum(after[rows] ** 2))
-            shares.append((refitted.chi2 - examination.fitted.chi2) / max(whole, 1e-30))
-        least = int(np.argmin(shares))
-        if shares[least] >= _LIMITS.prune_share:
+        changes = [examination.changed(number) for number in range(len(examination.applied))]
+        errors = [_model_error(each.effect) for each in examination.applied]
+        refits, worth = [], []
+        for number, change in enumerate(changes):
+            refitted = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
+            rows = np.flatnonzero(acts(change))
+            others = sum(
+                (error * float(np.linalg.norm(other[rows]))) ** 2
+                for i, (error, other) in enumerate(zip(errors, changes, strict=True))
+                if i != number
+            )
+            refits.append(refitted)
+            worth.append((refitted.chi2 - examination.fitted.chi2) / max(others, 1e-30))
+        least = int(np.argmin(worth))
+        if worth[least] >= 1.0 and _is_needed(examination, least, refits[least]):
             return examination
         examination = examination.dropping(least, refits[least])
     return examination
+
+
+def _model_error(effect: Effect) -> float:
+    """Return the share of its size that the model of an effect is off by: clocks and frames are exact."""
+    if effect.plans_anew:
+        return _LIMITS.law_error
+    return _LIMITS.form_error if effect.is_clock or effect.of_set_up else _LIMITS.model_error
+
+
+def _is_needed(examination: Examination, number: int, others: Fitted) -> bool:
+    """Tell whether the gain of an effect is surprising beside all others, which are refitted without it."""
+    sensitivity = sensitivity_of(examination.likelihood, examination.fitted, number)
+    gain = (others.chi2 - examination.fitted.chi2) / sensitivity.inflation()
+    return surprise(gain, len(examination.fitted.numbers.free[number].names)) >= examination.level
 
 
 _SETTLED = 0.1
