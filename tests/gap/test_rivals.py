@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals_of
+from gcode2krl.effects import Applied
+from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals_of, with_rival
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 from tests.gap.constructed import Added, applied, examined, motion, noise, trace, wave
 
@@ -120,3 +121,15 @@ def test_a_rival_pays_for_no_number_that_the_data_do_not_show():
     (rival_,) = found.values()
     assert rival_.applied["more_rad"] == 0.0
     assert rival_.cost_difference == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_rival_is_found_where_another_cause_does_most_of_what_the_cause_does():
+    """The mixed form is nearly the large one; what it has beside that is all of the twin."""
+    large, twin = wave(3.0, "large"), wave(2.0, "twin")
+    mixed = Added("mixed", lambda t: large.form(t) + 0.2 * twin.form(t))
+    y = 6.0 * large.form(TIME_S) + 0.4 * twin.form(TIME_S)
+    made = examined([trace(SIGMA * y[:, None] + noise(len(y), 1, SIGMA))], [large, twin, mixed], SIGMA)
+    small = next(i for i, each in enumerate(made.applied) if each.effect is not large)
+    swapped = with_rival(made, small, Applied(mixed, "A1", {"size_rad": 2.0 * SIGMA}))
+    number = next(i for i, each in enumerate(swapped.applied) if each.effect is mixed)
+    assert {each.applied.effect.name: each.alike for each in rivals_of(swapped, number)} == {"twin": True}

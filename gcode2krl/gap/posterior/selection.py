@@ -623,12 +623,10 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
     """Return the best other effects in place of an accepted one, each refitted along with the rest."""
     others = examination.without(number)
     spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
-    gain = examination.likelihood.chi2(others) - examination.fitted.chi2
+    power = examination.likelihood.chi2(others) - examination.fitted.chi2
     residual = examination.likelihood.residual(examination.applied)
     rivals: dict[Key, Rival] = {}
-    for start in itertools.chain(
-        _rival_twins(examination, number), _of_gain(examination, number, gain, spread)
-    ):
+    for start in itertools.chain(_rival_twins(examination, number), _of_gain(examination, number, spread)):
         if start.key in rivals or len(rivals) >= _LIMITS.most_rivals:
             continue
         bent = not start.effect.is_linear
@@ -639,14 +637,22 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
         difference = (fitted.chi2 - examination.fitted.chi2) / spread
         cost = difference + fitted.occam - examination.fitted.occam
         apart = examination.likelihood.residual(fitted.applied) - residual
-        distance2 = float(apart @ apart) / max(gain, 1e-300)
+        distance2 = float(apart @ apart) / max(power, 1e-300)
         rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
 
 
-def _of_gain(examination: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
-    """Yield other effects whose linear gain comes near that of a cause."""
-    for score in _ranked(examination, number):
+def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[Applied]:
+    """Yield other effects whose linear gain comes near that of a cause, the best first.
+
+    The gain of both is beside the others refitted: one that does much the same as another gains little.
+    """
+    gram = examination.data.gram(examination.fitted, without=number)
+    gain = gram.chi2 - examination.fitted.chi2
+    candidates = examination.data.candidates
+    columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
+    plausible = (score for score in scores(gram, columns) if score.within)
+    for score in sorted(plausible, key=lambda score: -score.gain):
         block = score.column.block
         share = _LIMITS.rival_share if block.effect.is_linear else _LIMITS.bent_rival_share
         if score.gain >= gain - max(share * gain, _LIMITS.rival_gain * spread):
@@ -659,14 +665,6 @@ def _rival_twins(examination: Examination, number: int) -> Iterator[Applied]:
     if not cause.effect.plans_anew:
         twins = twins_of(examination, cause, examination.without(number), examination.accepted_keys)
         yield from (twin.start for twin in twins)
-
-
-def _ranked(examination: Examination, number: int) -> list[Score]:
-    """Return the plausible scores of other effects with one accepted effect taken away, the best first."""
-    gram = examination.data.gram(examination.fitted, without=number)
-    candidates = examination.data.candidates
-    columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
-    return sorted((score for score in scores(gram, columns) if score.within), key=lambda score: -score.gain)
 
 
 def rival_probabilities(rivals: Sequence[Rival], of_cause: float) -> list[float]:
