@@ -211,19 +211,25 @@ def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
 
 
 def located(entries: Sequence[dict[str, Any]], result: dict[str, Any]) -> bool:
-    """Tell whether each true effect has a statement of its own, of a cause or of the rest, with its place."""
-    stated = [*_of_causes(named_of(result)), *_of_rest(result)]
-    places = [each.at for each in stated if each.place_probability >= STATED]
-    allowed = [allowed_by(entry) for entry in entries]
-    return bool(allowed) and all(allowed) and _each_has_its_own([a.at for a in allowed if a], places)
+    """Tell whether each true effect has a statement of its own, of a cause or of the rest, with its place.
+
+    A right name says the place, whatever family its numbers fit best.
+    """
+    stated = [(cause, {each.at for each in _of_causes([cause])}) for cause in named_of(result)]
+    stated += [({}, {each.at}) for each in _of_rest(result) if each.place_probability >= STATED]
+    return bool(entries) and _each_has_its_own(entries, stated)
 
 
-def _each_has_its_own(allowed: Sequence[frozenset[str]], places: Sequence[str]) -> bool:
-    if not allowed:
+def _each_has_its_own(
+    entries: Sequence[dict[str, Any]], stated: Sequence[tuple[dict[str, Any], set[str]]]
+) -> bool:
+    if not entries:
         return True
+    allowed = allowed_by(entries[0])
     return any(
-        place in allowed[0] and _each_has_its_own(allowed[1:], [*places[:i], *places[i + 1 :]])
-        for i, place in enumerate(places)
+        (names(cause, truth_of(entries[0])) or (allowed is not None and places & allowed.at))
+        and _each_has_its_own(entries[1:], [*stated[:i], *stated[i + 1 :]])
+        for i, (cause, places) in enumerate(stated)
     )
 
 

@@ -608,9 +608,6 @@ class PosteriorThresholds:
     left_out_groups: int = convention(
         4, "groups of stretches that are left out in turn when an effect is tested"
     )
-    prune_share: float = convention(
-        0.05, "an effect that brings less of the whole gain where it acts is dropped"
-    )
     quieter_noise: float = calibrated(
         0.7, DEVELOPMENT, "noise with less of its power beside the causes is learnt anew"
     )

@@ -62,6 +62,10 @@ def test_both_of_a_pair_are_located_by_statements_of_their_own():
     assert not both([cause(family="A2, reversals")], [depends("A2")])
     assert not both([cause(family="A2, reversals")], [depends("A1", probability=0.4)])
     assert both(rest=[depends("A1"), depends("A2")])
+    # a right name has its place, whatever its family
+    assert both([cause("friction", "A1", family="A4, place"), cause(family="A2, reversals")])
+    assert both([cause("friction", "A1", family=None)], [depends("A2")])
+    assert not both([cause("friction", "A1", family="A2, place")])
 
 
 def test_what_errs_alike_in_all_joints_is_told_of_all():

@@ -90,6 +90,18 @@ def test_a_size_at_an_end_of_its_range_is_at_a_bound_and_a_shape_is_not():
     assert not drift.at_bound(x)
 
 
+def test_of_a_positive_range_the_ends_are_near_by_ratios():
+    """Two seconds are four times the least time constant, and a two-thousandth of the longest."""
+    growth = free_of(applied("spindle_growth", um_per_krpm=5.0, time_constant_s=2.0), GEAR)
+    at = growth.names.index("time_constant_s")
+    ends = {}
+    for seconds in (0.5, 0.502, 2.0, 3590.0, 3600.0):
+        x = growth.start(applied("spindle_growth", um_per_krpm=5.0, time_constant_s=2.0))
+        x[at] = seconds
+        ends[seconds] = bool(growth.shapes_at_end(x))
+    assert ends == {0.5: True, 0.502: True, 2.0: False, 3590.0: True, 3600.0: True}
+
+
 def fitted(*effects, information):
     numbers = Numbers.of(effects, GEAR)
     return Fitted(tuple(effects), 10.0, numbers, numbers.start(effects), np.asarray(information))

@@ -1,9 +1,12 @@
 """Rivals: effects that do the same share one probability; others share what it leaves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals_of
+from gcode2krl.effects import Applied
+from gcode2krl.gap.posterior.selection import Rival, rival_probabilities, rivals_of, with_rival
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
 from tests.gap.constructed import Added, applied, examined, motion, noise, trace, wave
 
@@ -95,3 +98,38 @@ def test_a_similar_effect_is_worse_by_what_it_cannot_explain():
 def test_an_effect_that_explains_nothing_of_it_is_no_rival():
     _, found = with_rivals([wave(2.0), wave(3.0)], 2.0 * SIGMA * np.sin(2.0 * np.pi * 2.0 * TIME_S))
     assert found == {}
+
+
+class WithMore(Added):
+    """A wave with a smaller one beside it, which is not there unless the data show it."""
+
+    def __init__(self, name, hz, more_hz):
+        super().__init__(name, wave(hz).form)
+        self.more = wave(more_hz).form
+        (size,) = self.parameters
+        self.parameters = (size, replace(size, name="more_rad", minor=True))
+
+    def servo(self, q_act_rad, inputs, applied):
+        q = super().servo(q_act_rad, inputs, applied)
+        q[:, 0] += applied["more_rad"] * self.more(inputs.time_s)
+        return q
+
+
+def test_a_rival_pays_for_no_number_that_the_data_do_not_show():
+    cause, other = WithMore("cause", 2.0, 3.0), WithMore("other", 2.0, 5.0)
+    _, found = with_rivals([cause, other], 2.0 * SIGMA * cause.form(TIME_S))
+    (rival_,) = found.values()
+    assert rival_.applied["more_rad"] == 0.0
+    assert rival_.cost_difference == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_rival_is_found_where_another_cause_does_most_of_what_the_cause_does():
+    """The mixed form is nearly the large one; what it has beside that is all of the twin."""
+    large, twin = wave(3.0, "large"), wave(2.0, "twin")
+    mixed = Added("mixed", lambda t: large.form(t) + 0.2 * twin.form(t))
+    y = 6.0 * large.form(TIME_S) + 0.4 * twin.form(TIME_S)
+    made = examined([trace(SIGMA * y[:, None] + noise(len(y), 1, SIGMA))], [large, twin, mixed], SIGMA)
+    small = next(i for i, each in enumerate(made.applied) if each.effect is not large)
+    swapped = with_rival(made, small, Applied(mixed, "A1", {"size_rad": 2.0 * SIGMA}))
+    number = next(i for i, each in enumerate(swapped.applied) if each.effect is mixed)
+    assert {each.applied.effect.name: each.alike for each in rivals_of(swapped, number)} == {"twin": True}

@@ -103,13 +103,19 @@ def test_a_form_with_its_own_sign_here_and_there_is_no_effect():
     assert found(examined([trace(SIGMA * y[:, None] + noise(COUNT, 5, SIGMA))], [effect], SIGMA)) == []
 
 
-def test_what_brings_less_than_a_twentieth_is_dropped():
-    """Clear beside the noise, but a fiftieth of what is explained in all."""
-    loud = trace(
-        SIGMA * (20.0 * LARGE.form(TIME_S) + 2.0 * SMALL.form(TIME_S))[:, None] + noise(COUNT, 6, SIGMA)
-    )
-    assert found(examined([loud], [SMALL, LARGE], SIGMA)) == ["wave_3"]
-    assert found(examined([run(6, large=6.0, small=2.0)], [SMALL, LARGE], SIGMA)) == ["wave_3", "wave_2"]
+@pytest.mark.parametrize(("large", "small", "stays"), [(20.0, 2.0, True), (100.0, 2.0, False)])
+def test_a_small_effect_stays_beside_a_large_one_unless_models_are_off_by_as_much(large, small, stays):
+    """Clear beside the noise: a hundredth of what is explained in all, and less than a thousandth."""
+    made = examined([run(6, large=large, small=small)], [SMALL, LARGE], SIGMA)
+    assert found(made) == (["wave_3", "wave_2"] if stays else ["wave_3"])
+
+
+def test_what_others_have_made_needless_is_dropped():
+    """The sum of both comes first, as it takes the most; beside both it has nothing left to do."""
+    both = Added("both", lambda t: SMALL.form(t) + 0.8 * LARGE.form(t))
+    made = examined([run(8, small=3.0, large=3.0)], [both, SMALL, LARGE], SIGMA)
+    assert set(found(made)) <= {"wave_2", "wave_3", "both"}
+    assert len(made.applied) == 2
 
 
 LAG = library()["servo_lag"]

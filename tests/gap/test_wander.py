@@ -23,13 +23,15 @@ def residual(run, form):
     return noise(COUNT, 30 + run, width=3) + form[:, None] * [1.0, 0.0, 0.0]
 
 
-def judged(forms, link="force"):
+def judged(forms, link="force", effects_share=0.0):
+    """``effects_share``: what accepted effects say together, over what the best family says."""
     traces = [
         trace(residual(run, form), link, number=run, inputs=motion(20.0)) for run, form in enumerate(forms)
     ]
     found = examined(traces, [wave(9.0)], 1.0)
     rest = LinkFamilies(found, traces).rest
-    return rest, is_wander(found, traces, replace(rest, is_sized=True))
+    effects_nats = effects_share * rest.study.evidences[0].nats
+    return rest, is_wander(found, traces, replace(rest, is_sized=True), effects_nats)
 
 
 def test_a_swing_of_each_runs_own_is_wander():
@@ -63,3 +65,9 @@ def test_of_a_single_run_nobody_can_tell():
 def test_what_happens_in_one_run_alone_is_an_event():
     slipped = [1.4 * np.tanh(TIME_S - 10.0) * (run == 1) for run in range(RUNS)]
     assert not judged(slipped)[1]
+
+
+def test_what_effects_of_all_runs_say_as_well_is_no_wander():
+    swings = [swing(run) for run in range(RUNS)]
+    assert judged(swings, effects_share=0.5)[1]
+    assert not judged(swings, effects_share=0.95)[1]

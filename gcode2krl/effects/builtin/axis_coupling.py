@@ -43,6 +43,7 @@ class AxisCoupling(Effect):
             start=0.01,
             linear=True,
             source="a tenth of what a gear of a large arm twists, 0.006-0.06",
+            minor=True,
         ),
     )
 

@@ -485,6 +485,11 @@ class LinkFamilies:
         """Return the traces that it is of."""
         return self._rows.traces
 
+    @property
+    def effects_nats(self) -> float:
+        """Return the evidence of all causes together."""
+        return 0.5 * (self._bare.chi2 - self._whole.chi2 - self._found.fitted.occam)
+
     def beside(self, named: Collection[int]) -> Rest:
         """Return on what depends what is left beside the named causes alone, by their numbers."""
         unnamed = tuple(number for number in self._found.cause_numbers if number not in named)

@@ -701,14 +701,23 @@ class Examination:
         """Return the examination with a candidate that is not tried again."""
         return replace(self, rejected=self.rejected | {key})
 
-    def rows_changed(self, number: int) -> Bools:
-        """Return which of the data (v,) an accepted effect changes at all."""
+    def changed(self, number: int) -> Floats:
+        """Return what an accepted effect does to the data (v,), whitened."""
         others = self.without(number)
         change: Floats = self.likelihood.whiten(
             [trace.sample(self.applied) - trace.sample(others) for trace in self.traces]
         )
-        changed: Bools = np.abs(change) > _ACTS * np.abs(change).max(initial=0.0)
-        return changed
+        return change
+
+    def rows_changed(self, number: int) -> Bools:
+        """Return which of the data (v,) an accepted effect changes at all."""
+        return acts(self.changed(number))
+
+
+def acts(change: Floats) -> Bools:
+    """Return which of the data (v,) a change is more than rounding of."""
+    changed: Bools = np.abs(change) > _ACTS * np.abs(change).max(initial=0.0)
+    return changed
 
 
 def fitted_signal(trace: Trace, examination: Examination, stamps_s: Floats | None = None) -> Floats:

@@ -8,7 +8,8 @@ signature; over thousands of samples that is enough to look like something else.
 walks, 1/f noise and the zero of an amplifier are smooth in time, or nearly so, in all runs and alike in no
 two. Where time in each run says clearly more of a rest than any other input, moves the signal by no more than
 slow noise may (`noise_most_slow`), and leaves nothing significant once taken off, it is noise of a long
-memory. What happens in one run alone is an event.
+memory. Effects that all runs share and that together say nearly as much (`time_ahead_share`) are no noise,
+whether or not they get their names. What happens in one run alone is an event.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -234,10 +235,13 @@ def _coefficient(trace: Trace, clock: Floats, others: Sequence[Floats]) -> float
     return float(coefficients[0] / scale[0])
 
 
-def is_wander(examination: Examination, traces: Sequence[Trace], rest: Rest) -> bool:
+def is_wander(
+    examination: Examination, traces: Sequence[Trace], rest: Rest, effects_nats: float = 0.0
+) -> bool:
     """Tell whether what is left of a link without any cause (`rest`, of these traces) is such a wander.
 
-    Trackers and force sensors wander; an encoder counts.
+    ``effects_nats``: what the accepted effects say of it together. Trackers and force sensors wander; an
+    encoder counts.
     """
     if (
         examination.link.of_joints
@@ -247,6 +251,8 @@ def is_wander(examination: Examination, traces: Sequence[Trace], rest: Rest) -> 
     ):
         return False
     best = rest.study.evidences[0]
+    if effects_nats > (1.0 - THRESHOLDS.posterior.time_ahead_share) * best.nats:
+        return False
     if not _is_small(best, examination.noise):
         return False
     steady = [_less(trace, best, signal) for trace, signal in zip(traces, best.signal, strict=True)]
@@ -528,7 +534,7 @@ def _judgement(
     is_foretold = bool(trials) and sizes[0].is_loud and last.share_left <= _LIMITS.named_left
     is_gap = _is_gap(examination, sizes[0], rest) or is_foretold
     if not named and is_gap:
-        is_gap = not is_wander(examination, families.traces, rest)
+        is_gap = not is_wander(examination, families.traces, rest, families.effects_nats)
     verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
     return _of(examination, verdict, tuple(causes), last, rest, held_out=bool(trials))
 

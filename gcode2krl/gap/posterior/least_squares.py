@@ -281,10 +281,19 @@ class Free:
         return bool(np.any(self._near(x) & sizes))
 
     def _near(self, x: Floats) -> Bools:
-        """Tell which numbers (p,) stand at an end of their range."""
-        span = self.high - self.low
-        near: Bools = (x - self.low < _AT_BOUND * span) | (self.high - x < _AT_BOUND * span)
-        return near & np.isfinite(span)
+        """Tell which numbers (p,) stand at an end of their range; where all of it is positive, by ratios.
+
+        Of a time constant of 0.5 to 3600 s, 2 s are not at its end.
+        """
+        is_ratio = self.low > 0.0
+        x, low, high = (
+            np.where(is_ratio, np.log(np.where(is_ratio, each, 1.0)), each)
+            for each in (x, self.low, self.high)
+        )
+        span = high - low
+        near: Bools = (x - low < _AT_BOUND * span) | (high - x < _AT_BOUND * span)
+        near &= np.isfinite(span)
+        return near
 
     def shapes_at_end(self, x: Floats) -> frozenset[str]:
         """Return the shapes that stand at an end of their range."""

@@ -25,13 +25,13 @@ import numpy as np
 from scipy import special
 
 from gcode2krl.arrays import Floats
-from gcode2krl.effects import Applied, Inputs
+from gcode2krl.effects import Applied, Effect, Inputs
 from gcode2krl.gap.compare.trace import Link, Trace
 from gcode2krl.gap.components import Block, Signatures
 from gcode2krl.gap.noise.nuisance import Candidates, Column, Question, nuisance_for
 from gcode2krl.gap.noise.short import Noise
 from gcode2krl.gap.noise.source import noise_of, noise_of_poses
-from gcode2krl.gap.posterior.examination import Examination, LinkData, fitted_mismatch, moments_off
+from gcode2krl.gap.posterior.examination import Examination, LinkData, acts, fitted_mismatch, moments_off
 from gcode2krl.gap.posterior.gram import Gram, solve
 from gcode2krl.gap.posterior.least_squares import Fitted
 from gcode2krl.gap.posterior.likelihood import Key, Sensitivity, refit, searched, sensitivity_of
@@ -543,27 +543,44 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
 
 
 def _pruned(examination: Examination) -> Examination:
-    """Return the examination without effects that bring little of the whole gain where they act.
+    """Return the examination without effects that the others may be off by, or that they have made needless.
 
-    An effect of one joint is compared with the gain in that joint.
+    However large another effect is, a small one stays where it is surprising beside all others, and brings
+    more than the models of these are off by where it acts.
     """
-    before = examination.likelihood.residual(()) if len(examination.applied) > 1 else np.zeros(0)
     while len(examination.applied) > 1:
-        after = examination.likelihood.residual(examination.applied)
-        refits = [
-            refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
-            for number in range(len(examination.applied))
-        ]
-        shares = []
-        for number, refitted in enumerate(refits):
-            rows = np.flatnonzero(examination.rows_changed(number))
-            whole = float(np.sum(before[rows] ** 2) - np.sum(after[rows] ** 2))
-            shares.append((refitted.chi2 - examination.fitted.chi2) / max(whole, 1e-30))
-        least = int(np.argmin(shares))
-        if shares[least] >= _LIMITS.prune_share:
+        changes = [examination.changed(number) for number in range(len(examination.applied))]
+        errors = [_model_error(each.effect) for each in examination.applied]
+        refits, worth = [], []
+        for number, change in enumerate(changes):
+            refitted = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
+            rows = np.flatnonzero(acts(change))
+            others = sum(
+                (error * float(np.linalg.norm(other[rows]))) ** 2
+                for i, (error, other) in enumerate(zip(errors, changes, strict=True))
+                if i != number
+            )
+            refits.append(refitted)
+            worth.append((refitted.chi2 - examination.fitted.chi2) / max(others, 1e-30))
+        least = int(np.argmin(worth))
+        if worth[least] >= 1.0 and _is_needed(examination, least, refits[least]):
             return examination
         examination = examination.dropping(least, refits[least])
     return examination
+
+
+def _model_error(effect: Effect) -> float:
+    """Return the share of its size that the model of an effect is off by: clocks and frames are exact."""
+    if effect.plans_anew:
+        return _LIMITS.law_error
+    return _LIMITS.form_error if effect.is_clock or effect.of_set_up else _LIMITS.model_error
+
+
+def _is_needed(examination: Examination, number: int, others: Fitted) -> bool:
+    """Tell whether the gain of an effect is surprising beside all others, which are refitted without it."""
+    sensitivity = sensitivity_of(examination.likelihood, examination.fitted, number)
+    gain = (others.chi2 - examination.fitted.chi2) / sensitivity.inflation()
+    return surprise(gain, len(examination.fitted.numbers.free[number].names)) >= examination.level
 
 
 _SETTLED = 0.1
@@ -606,29 +623,36 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
     """Return the best other effects in place of an accepted one, each refitted along with the rest."""
     others = examination.without(number)
     spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
-    gain = examination.likelihood.chi2(others) - examination.fitted.chi2
+    power = examination.likelihood.chi2(others) - examination.fitted.chi2
     residual = examination.likelihood.residual(examination.applied)
     rivals: dict[Key, Rival] = {}
-    for start in itertools.chain(
-        _rival_twins(examination, number), _of_gain(examination, number, gain, spread)
-    ):
+    for start in itertools.chain(_rival_twins(examination, number), _of_gain(examination, number, spread)):
         if start.key in rivals or len(rivals) >= _LIMITS.most_rivals:
             continue
         bent = not start.effect.is_linear
         fitted = refit(examination.likelihood, (*others, start), steps=_STEPS, scan=bent)
         if fitted.at_bound[-1] or not np.isfinite(fitted.chi2):
             continue
+        fitted = with_shown_numbers(examination, fitted)  # as the cause that it is compared with
         difference = (fitted.chi2 - examination.fitted.chi2) / spread
         cost = difference + fitted.occam - examination.fitted.occam
         apart = examination.likelihood.residual(fitted.applied) - residual
-        distance2 = float(apart @ apart) / max(gain, 1e-300)
+        distance2 = float(apart @ apart) / max(power, 1e-300)
         rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
 
 
-def _of_gain(examination: Examination, number: int, gain: float, spread: float) -> Iterator[Applied]:
-    """Yield other effects whose linear gain comes near that of a cause."""
-    for score in _ranked(examination, number):
+def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[Applied]:
+    """Yield other effects whose linear gain comes near that of a cause, the best first.
+
+    The gain of both is beside the others refitted: one that does much the same as another gains little.
+    """
+    gram = examination.data.gram(examination.fitted, without=number)
+    gain = gram.chi2 - examination.fitted.chi2
+    candidates = examination.data.candidates
+    columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
+    plausible = (score for score in scores(gram, columns) if score.within)
+    for score in sorted(plausible, key=lambda score: -score.gain):
         block = score.column.block
         share = _LIMITS.rival_share if block.effect.is_linear else _LIMITS.bent_rival_share
         if score.gain >= gain - max(share * gain, _LIMITS.rival_gain * spread):
@@ -641,14 +665,6 @@ def _rival_twins(examination: Examination, number: int) -> Iterator[Applied]:
     if not cause.effect.plans_anew:
         twins = twins_of(examination, cause, examination.without(number), examination.accepted_keys)
         yield from (twin.start for twin in twins)
-
-
-def _ranked(examination: Examination, number: int) -> list[Score]:
-    """Return the plausible scores of other effects with one accepted effect taken away, the best first."""
-    gram = examination.data.gram(examination.fitted, without=number)
-    candidates = examination.data.candidates
-    columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
-    return sorted((score for score in scores(gram, columns) if score.within), key=lambda score: -score.gain)
 
 
 def rival_probabilities(rivals: Sequence[Rival], of_cause: float) -> list[float]:
