@@ -815,6 +815,9 @@ class AnswerThresholds:
     moments_share: float = convention(
         0.05, "of the time: what has half of its power in less is told with the moment of its largest"
     )
+    swing_s: float = convention(
+        0.025, "two cycles of an interpolator: what swings to and fro so quickly has its moment between"
+    )
     impulse_probability: float = convention(
         0.95, "of an impulse that no noise makes, that it is what happened at its place"
     )

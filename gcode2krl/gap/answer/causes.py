@@ -121,10 +121,6 @@ def _moment(cause: Cause, judgement: Judged, pairs: Sequence[Pair]) -> MomentRes
     return None
 
 
-_SWING_S = 0.025
-"""Two cycles of an interpolator: what swings to and fro so quickly has its moment between."""
-
-
 def moment_of(
     traces: Sequence[Trace], signals: Sequence[Floats], *, is_smooth: bool = False
 ) -> MomentResult | None:
@@ -140,7 +136,7 @@ def moment_of(
     number = int(np.argmax([power.max() for power in powers]))
     trace, power = traces[number], powers[number]
     row = int(np.argmax(power))
-    near = np.abs(trace.time_s - trace.time_s[row]) <= _SWING_S
+    near = np.abs(trace.time_s - trace.time_s[row]) <= _LIMITS.swing_s
     at_s = float(power[near] @ trace.time_s[near] / power[near].sum())
     if is_smooth:
         low = np.flatnonzero(power < power[row] / 4.0)
