@@ -608,6 +608,9 @@ class PosteriorThresholds:
     left_out_groups: int = convention(
         4, "groups of stretches that are left out in turn when an effect is tested"
     )
+    counted_share: float = convention(
+        0.05, "of a cause's gain, what another brings that makes its name less sure: smaller ones are details"
+    )
     quieter_noise: float = calibrated(
         0.7, DEVELOPMENT, "noise with less of its power beside the causes is learnt anew"
     )

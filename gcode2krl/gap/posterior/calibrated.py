@@ -67,7 +67,7 @@ class Features:
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
     causes: int
-    """Number of causes that were accepted in the link."""
+    """Number of causes that were accepted in the link and are not far smaller."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -143,10 +143,10 @@ def features_of(
     held_out: HeldOut,
 ) -> Features:
     """Return the features of an accepted effect."""
-    chi2 = found.likelihood.chi2(found.without(number))
+    gain = found.gains[number]
     return Features(
         surprise=_within(found.surprises[number] - found.level),
-        size_over_noise=(max(chi2 - found.fitted.chi2, 0.0) / found.data.values) ** 0.5,
+        size_over_noise=(max(gain, 0.0) / found.data.values) ** 0.5,
         margin=_within(tests.margin),
         form_ratio=tests.form_ratio,
         other_share=tests.other_share,
@@ -159,7 +159,7 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
-        causes=len(found.causes),
+        causes=sum(found.gains[each] >= _LIMITS.counted_share * gain for each in found.cause_numbers),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,
