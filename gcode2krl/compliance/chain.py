@@ -8,6 +8,8 @@ wherever it is: results do not depend on how rows are cut into chunks.
 
 import math
 
+import numpy as np
+
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.compiled.core import FLOATS, INTS32, OUT_FLOATS, core_function
 
@@ -19,7 +21,11 @@ AXIS_SIGN = (-1.0, 1.0, 1.0, -1.0, 1.0, -1.0)
 AXIS_ZERO = (0.0, 0.0, -math.pi / 2, 0.0, 0.0, math.pi)
 """theta = AXIS_SIGN·A + AXIS_ZERO, A with the controller's sign and zero."""
 
-_displaced = core_function("compliance_displaced", *(FLOATS,) * 7, INTS32, OUT_FLOATS, OUT_FLOATS)
+NO_SPEED, NO_VELOCITY = np.zeros((0, 6)), np.zeros((0, 3))
+
+_displaced = core_function(
+    "compliance_displaced", *(FLOATS,) * 7, INTS32, OUT_FLOATS, OUT_FLOATS, FLOATS, OUT_FLOATS
+)
 _tip = core_function("compliance_tip", *(FLOATS,) * 5, INTS32, OUT_FLOATS, OUT_FLOATS)
 
 
@@ -34,15 +40,19 @@ def displaced_rows(
     tool: Ints32,
     shift_mm: Floats,
     turn_rad: Floats,
+    qd_rad_s: Floats = NO_SPEED,
+    velocity_mm_s: Floats = NO_VELOCITY,
 ) -> None:
-    """Write how far the tip moves under a load, eq. 2-9.
+    """Write how far the tip moves under a load, eq. 2-9, and how fast the rigid tip goes.
 
     ``q_rad`` (n, 6); force and moment (n, 3) at the tip along the axes of ``base``, whose rotation in the
     root is (3, 3); ``frames`` (10, 4) cos alpha, sin alpha, a, d; ``softness`` (10, 3) = 1/k_C, 1/k_B, 1/k_A;
     tip of row i in frame 10 is ``tips_mm[tool[i]]``. Results (n, 3) along ``base``: shift, and rotation
-    vector, which is left out where ``turn_rad`` is (0, 3).
+    vector, which is left out where ``turn_rad`` is (0, 3). So is the velocity (n, 3), from joint speeds
+    ``qd_rad_s`` (n, 6).
     """
-    _displaced(q_rad, force_N, moment_Nmm, frames, softness, base, tips_mm, tool, shift_mm, turn_rad)
+    load = (q_rad, force_N, moment_Nmm, frames, softness, base, tips_mm, tool)
+    _displaced(*load, shift_mm, turn_rad, qd_rad_s, velocity_mm_s)
 
 
 def tip_rows(

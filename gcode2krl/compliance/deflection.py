@@ -8,7 +8,7 @@ backlash, friction or weight. The authors found the measured deflection 6 % larg
 import numpy as np
 import numpy.typing as npt
 
-from gcode2krl.arrays import Floats
+from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compliance import chain, model
@@ -62,7 +62,9 @@ def displace(
     ValueError
         If an array has the wrong shape.
     """
-    return _displaced(q_rad, force_root_N, moment_root_Nmm, cell, tool, model.softness(cell), threads=threads)
+    load = (q_rad, force_root_N, moment_root_Nmm, cell, tool, model.softness(cell))
+    shift, turn, _ = _displaced(*load, threads=threads)
+    return shift, turn
 
 
 def joint_shares(
@@ -120,19 +122,38 @@ def deflection_of(
         If an array has the wrong shape.
     """
     base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
-    deflection, _ = _displaced(
+    deflection, _, _ = _displaced(
         q_rad, force_base_N, moment_base_Nmm, cell, tool, model.softness(cell), base, False, threads
     )
     feed = rows_of("feed_base", feed_base, 3, len(deflection))
-    bent = rows_of("deflection", deflection, 3)
+    return deflection, _corrections(deflection, feed, threads)
+
+
+def deflection_along(
+    q_rad: Floats, qd_rad_s: Floats, force_base_N: Floats, moment_base_Nmm: Floats, cell: Cell, tool: Ints32
+) -> tuple[Floats, Floats]:
+    """Return what `deflection_of` returns, where the feed direction is that of `feed_direction`.
+
+    ``qd_rad_s`` (n, 6) are the speeds of the joints; other parameters and errors as there.
+    """
+    base = np.ascontiguousarray(cell.base_matrix()[:3, :3])
+    load = (q_rad, force_base_N, moment_base_Nmm, cell, tool, model.softness(cell), base)
+    qd = rows_of("qd_rad_s", qd_rad_s, 6, len(q_rad))
+    deflection, _, feed = _displaced(*load, turned=False, qd_rad_s=qd)
+    make_directions(feed, STANDSTILL_MM_S)
+    return deflection, _corrections(deflection, feed)
+
+
+def _corrections(deflection: Floats, feed: Floats, threads: int | None = None) -> Floats:
+    """Return minus the deflection (n, 3) without its component along the feed (n, 3)."""
     correction = np.empty_like(deflection)
 
     def work(start: int, end: int) -> None:
         rows = slice(start, end)
-        project_rows(bent[rows], feed[rows], -1.0, correction[rows])
+        project_rows(deflection[rows], feed[rows], -1.0, correction[rows])
 
     in_chunks(work, chunk_borders(len(deflection)), threads)
-    return deflection, correction
+    return correction
 
 
 def deflection_magnitude(
@@ -190,14 +211,19 @@ def _displaced(
     base: Floats = ROOT,
     turned: bool = True,
     threads: int | None = None,
-) -> tuple[Floats, Floats]:
-    """Return displacement and rotation vector (n, 3) along ``base``; the latter (0, 3) if not asked for."""
+    qd_rad_s: Floats = chain.NO_SPEED,
+) -> tuple[Floats, Floats, Floats]:
+    """Return displacement, rotation vector and the rigid tip's velocity (n, 3) along ``base``.
+
+    Rotation and velocity are (0, 3) if not asked for.
+    """
     q = rows_of("q_rad", q_rad, 6)
     force = rows_of("force", force_N, 3, len(q))
     moment = rows_of("moment", moment_Nmm, 3, len(q))
     tip = model.tips(cell, tool, len(q))
     frames = model.frames(cell)
-    shift, turn = np.empty((len(q), 3)), np.empty((len(q) if turned else 0, 3))
+    counts = (len(q), len(q) if turned else 0, len(qd_rad_s))
+    shift, turn, velocity = (np.empty((count, 3)) for count in counts)
 
     def work(start: int, end: int) -> None:
         rows = slice(start, end)
@@ -212,10 +238,12 @@ def _displaced(
             tip.tool[rows],
             shift[rows],
             turn[rows],
+            qd_rad_s[rows],
+            velocity[rows],
         )
 
     in_chunks(work, chunk_borders(len(q)), threads)
-    return shift, turn
+    return shift, turn, velocity
 
 
 def _tip(

@@ -5,7 +5,7 @@ import math
 from gcode2krl.arrays import Floats, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.carried import points_moved, to_rest, vectors_turned
-from gcode2krl.compliance.deflection import deflection_of, feed_direction, tip_position
+from gcode2krl.compliance.deflection import deflection_along, deflection_of, feed_direction, tip_position
 from gcode2krl.compliance.model import stiffness
 from gcode2krl.frames import invert
 from gcode2krl.tables import Deflection, Forces, Joints, chord_directions
@@ -43,14 +43,16 @@ def deflect(joints: Joints, forces: Forces, cell: Cell) -> Deflection:
 
 def deflect_at(q_rad: Floats, qd_rad_s: Floats, external: Floats, forces: Forces, cell: Cell) -> Deflection:
     """Return what `deflect` returns, from joints (m, 6), their speeds (m, 6) and E1 to E6 (m, 6)."""
-    feed = feed_direction(q_rad, qd_rad_s, cell, forces.tool)
     force, moment = forces.force_base_N, forces.moment_base_Nmm
     by = to_rest(external, cell)
     if by is None:
-        deflection, correction = deflection_of(q_rad, force, moment, feed, cell, forces.tool)
+        deflection, correction = deflection_along(q_rad, qd_rad_s, force, moment, cell, forces.tool)
     else:
-        if len(by) > 1:  # the tip goes along the part otherwise than along the arm's root
-            feed = vectors_turned(_feed_on_part(q_rad, by, forces.tool, cell), by)
+        feed = (
+            vectors_turned(_feed_on_part(q_rad, by, forces.tool, cell), by)
+            if len(by) > 1  # the tip goes along the part otherwise than along the arm's root
+            else feed_direction(q_rad, qd_rad_s, cell, forces.tool)
+        )
         load = vectors_turned(force, by), vectors_turned(moment, by)
         bent = deflection_of(q_rad, *load, feed, cell, forces.tool)
         deflection, correction = (vectors_turned(vector, invert(by)) for vector in bent)

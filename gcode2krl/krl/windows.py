@@ -11,6 +11,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Rows
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.chunks import chunked
+from gcode2krl.compiled.core import BOOLS, FLOAT, FLOATS, INT, OUT_FLOATS, core_function
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue, RefusedError
 from gcode2krl.krc4 import Chain
@@ -24,6 +25,9 @@ COUNTS_FROM_END_OF_ARC = True
 (KUKA's documentation as remembered; not confirmed by a trace)."""
 _SAME_PATH = 1e-3
 _AT_REST_MM = 1e-6
+
+_straight = core_function("krl_straight", *(FLOATS,) * 4, BOOLS, FLOATS, *(OUT_FLOATS,) * 3)
+_instants = core_function("krl_instants", *(FLOATS,) * 4, FLOAT, FLOATS, BOOLS, INT, FLOAT, OUT_FLOATS)
 
 
 @dataclass(frozen=True)
@@ -128,16 +132,12 @@ def _arc_starts(arrive_mm: Floats) -> Floats:
 
 def _straight_parts(chain: Chain, targets: Targets) -> tuple[Floats, Floats, Floats]:
     """Return (n,) lengths in mm of the straight part of each move, and of its parts in corners."""
-    length = chunked(lambda rows: _length(chain, rows), len(chain.length_mm))
-    head, tail = np.zeros(len(length)), np.zeros(len(length))
-    if len(length) > 1:
-        corner = chain.blend_mm[:-1] > 0
-        rows = slice(chain.first + 1, chain.first + len(length))
-        half = np.minimum(length[:-1], length[1:]) / 2.0
-        on = np.where(chain.stop[:-1], 0.0, np.minimum(targets.cdis_mm[rows], half))  # straight on: no corner
-        tail[:-1] = np.where(corner, chain.blend_mm[:-1] * chain.scale[:-1], on)
-        head[1:] = np.where(corner, chain.blend_mm[:-1] * chain.scale[1:], on)
-    return np.maximum(length - head - tail, 0.0), head, tail
+    first, count = chain.first, len(chain.length_mm)
+    straight_mm, head_mm, tail_mm = np.empty((3, count))
+    corners = (chain.blend_mm, chain.scale, chain.stop, targets.cdis_mm[first + 1 : first + count])
+    columns = map(np.ascontiguousarray, (chain.start_mm, chain.end_mm, *corners))
+    _straight(*columns, straight_mm, head_mm, tail_mm)
+    return straight_mm, head_mm, tail_mm
 
 
 def _arc_lengths(chain: Chain, head_mm: Floats, tail_mm: Floats) -> Floats:
@@ -149,19 +149,10 @@ def _arc_lengths(chain: Chain, head_mm: Floats, tail_mm: Floats) -> Floats:
     return chunked(lambda rows: _arcs_behind(chain, head_mm, tail_mm, rows), count)
 
 
-def _way(chain: Chain, rows: slice) -> Floats:
-    return np.asarray(chain.end_mm[rows] - chain.start_mm[rows])
-
-
-def _length(chain: Chain, rows: slice) -> Floats:
-    way = _way(chain, rows)
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", way, way)))
-
-
 def _arcs_behind(chain: Chain, head_mm: Floats, tail_mm: Floats, rows: slice) -> Floats:
     """Return the lengths of the parabolas behind moves."""
     both = slice(rows.start, rows.stop + 1)
-    way = _way(chain, both)
+    way = chain.end_mm[both] - chain.start_mm[both]
     size = np.maximum(np.sqrt(np.einsum("ij,ij->i", way, way)), 1e-300)
     unit = way / size[:, None]
     p, q = unit[:-1] * tail_mm[rows, None], unit[1:] * head_mm[both][1:, None]
@@ -200,51 +191,20 @@ class _Clock:
     """Path to time of a Motion, with its standstills."""
 
     def __init__(self, motion: Motion | PilotForce, cell: Cell) -> None:
-        self.time_s, self.path_mm, self.speed = motion.time_s, motion.path_mm, motion.speed_mm_s
-        self.acceleration = motion.acceleration_mm_s2
         k_s = cell.controller.k_s
-        self.jerk = cell.controller.acc_cp_m_s2 * MM_PER_M / k_s if k_s > 0 else np.inf
+        jerk = cell.controller.acc_cp_m_s2 * MM_PER_M / k_s if k_s > 0 else np.inf
+        columns = (motion.time_s, motion.path_mm, motion.speed_mm_s, motion.acceleration_mm_s2)
+        self._samples = (*map(np.ascontiguousarray, columns), jerk)
 
     def arrival(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is reached; at rest it is where the motion ends."""
-
-        def arrived(rows: slice) -> Floats:
-            after = np.searchsorted(self.path_mm, path_mm[rows] - _AT_REST_MM, side="left")
-            after = np.clip(after, 1, len(self.time_s) - 1)
-            instants, stop = self._between(path_mm[rows], after), after[at_rest[rows]]
-            stopping = self.time_s[stop - 1] + self._from_rest(stop - 1)
-            instants[at_rest[rows]] = np.minimum(stopping, self.time_s[stop])
-            return instants
-
-        return chunked(arrived, len(path_mm))
+        return self._instants(path_mm, at_rest, leaves=False)
 
     def departure(self, path_mm: Floats, at_rest: Bools) -> Floats:
         """Return the instants (n,) at which a path is left; at rest it is where the motion begins."""
+        return self._instants(path_mm, at_rest, leaves=True)
 
-        def left(rows: slice) -> Floats:
-            after = np.searchsorted(self.path_mm, path_mm[rows] + _AT_REST_MM, side="right")
-            after = np.clip(after, 1, len(self.time_s) - 1)
-            instants, start = self._between(path_mm[rows], after), after[at_rest[rows]]
-            starting = self.time_s[start] - self._from_rest(start)
-            instants[at_rest[rows]] = np.maximum(starting, self.time_s[start - 1])
-            return instants
-
-        return chunked(left, len(path_mm))
-
-    def _from_rest(self, sample: Rows) -> Floats:
-        """Return how long before a sample the motion began: v = J·t²/2 at first, then v = a·(t - a/(2·J))."""
-        v, a = self.speed[sample], self.acceleration[sample]
-        return np.where(a > 0, v / np.where(a > 0, a, 1.0) + a / (2.0 * self.jerk), 0.0)
-
-    def _between(self, path_mm: Floats, after: Rows) -> Floats:
-        """Return the instants (n,) between two samples, at an acceleration that is constant in between."""
-        before = after - 1
-        way = self.path_mm[after] - self.path_mm[before]
-        part = np.clip(path_mm - self.path_mm[before], 0.0, way)
-        v0, v1 = self.speed[before], self.speed[after]
-        moves = (way > 0) & (v0 + v1 > 0)
-        safe = np.where(moves, way, 1.0)
-        v = np.sqrt(np.maximum(v0 * v0 + (v1 * v1 - v0 * v0) * part / safe, 0.0))
-        share = np.where(moves, part / safe * (v0 + v1) / np.where(v0 + v > 0, v0 + v, 1.0), 1.0)
-        step_s = self.time_s[after] - self.time_s[before]
-        return np.asarray(self.time_s[before] + np.clip(share, 0.0, 1.0) * step_s)
+    def _instants(self, path_mm: Floats, at_rest: Bools, leaves: bool) -> Floats:
+        instants = np.empty(len(path_mm))
+        _instants(*self._samples, path_mm, at_rest, leaves, _AT_REST_MM, instants)
+        return instants

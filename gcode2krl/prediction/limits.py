@@ -10,11 +10,13 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
+from gcode2krl.compiled.core import FLOATS, INT, OUT_FLOATS, core_function
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Deflection, Forces, Motion, lengths
@@ -27,6 +29,8 @@ ABSURD_FORCE_N = 100_000.0
 """No robot of the library carries a tenth of it (10 t): the figure is a mistake, not a prediction."""
 ABSURD_DEFLECTION_MM = 100.0
 """The compliance model is linear in small angles: at this size, 2° on a reach of 3 m, it is not valid."""
+
+_find_longest = core_function("prediction_longest", FLOATS, OUT_FLOATS, returns=INT)
 
 
 def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
@@ -188,15 +192,14 @@ class DeflectionLimit:
         """
         if self.absurd is not None or not len(line):
             return
-        with np.errstate(over="ignore", invalid="ignore"):
-            size_mm = lengths(deflection.deflection_base_mm)
-            across_mm = lengths(deflection.correction_base_mm)
-        self.absurd = _absurd_deflection(deflection, size_mm, reached, line)
+        vectors = (deflection.deflection_base_mm, deflection.correction_base_mm)
+        bent, across = map(_longest, vectors)
+        if not (bent.is_known and across.is_known and bent.length <= ABSURD_DEFLECTION_MM):
+            self.absurd = _absurd_deflection(deflection, reached, line)
         if self.absurd is not None and self._known:  # what nobody stated refuses no program
             self.absurd = replace(self.absurd, severity="warning")
-        tool = np.zeros(len(line), dtype=np.int32)
-        self.bent.take(np.nan_to_num(size_mm), line, tool)
-        self.across.take(np.nan_to_num(across_mm), line, tool)
+        self.bent.raise_to(bent.length, int(line[bent.row]))
+        self.across.raise_to(across.length, int(line[across.row]))
 
     def issues(self) -> Iterator[Issue]:
         """Yield the deflection that exceeds the limit, at its largest value."""
@@ -222,10 +225,30 @@ class Largest:
     def take(self, values: Floats, line: Ints32, tool: Ints32) -> int | None:
         """Take values (m,) with lines and tools; return the row of a new largest one, None without."""
         row = int(values.argmax())
-        if not values[row] > self.value:
-            return None
-        self.value, self.line, self.tool = float(values[row]), int(line[row]), int(tool[row])
-        return row
+        return row if self.raise_to(float(values[row]), int(line[row]), int(tool[row])) else None
+
+    def raise_to(self, value: float, line: int, tool: int = 0) -> bool:
+        """Take one value; tell whether it is a new largest one."""
+        if not value > self.value:
+            return False
+        self.value, self.line, self.tool = value, line, tool
+        return True
+
+
+class _Longest(NamedTuple):
+    """The first of the longest vectors; one that is not a number counts as 0."""
+
+    row: int
+    length: float
+    is_known: bool
+    """Whether all vectors are finite."""
+
+
+def _longest(vectors: Floats) -> _Longest:
+    """Return the longest of vectors (m, 3)."""
+    found = np.empty(2)
+    row = _find_longest(np.ascontiguousarray(vectors), found)
+    return _Longest(row, float(found[0]), bool(found[1]))
 
 
 def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None:
@@ -241,11 +264,11 @@ def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None
     return Issue("error", "force-absurd", int(line[wrong]), sentence, remedy)
 
 
-def _absurd_deflection(deflection: Deflection, size_mm: Floats, reached: Bools, line: Ints32) -> Issue | None:
+def _absurd_deflection(deflection: Deflection, reached: Bools, line: Ints32) -> Issue | None:
     """Return the finding on an absurd deflection, None if there is none."""
     columns = (deflection.deflection_base_mm, deflection.correction_base_mm)
-    if all(np.isfinite(column).all() for column in columns) and size_mm.max() <= ABSURD_DEFLECTION_MM:
-        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        size_mm = lengths(deflection.deflection_base_mm)
     finite = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])
     wrong = reached & ~(finite & (size_mm <= ABSURD_DEFLECTION_MM))
     if not wrong.any():

@@ -186,16 +186,35 @@ static void to_rotation_vectors(int64_t rows, Carried *state) {
     }
 }
 
-/* Write how far the tip moves under a load, eq. 2-9; compliance/chain.py says of which arrays. */
+/* Write how fast each frame turns about its z. */
+static void rates_of(Floats qd_rad_s, int64_t first, int64_t rows, Scalar *rate) {
+    for (int axis = 0; axis < AXES; axis++)
+        for (int64_t j = 0; j < rows; j++)
+            rate[AXIS_FRAME[axis]][j] = AXIS_SIGN[axis] * CELL(qd_rad_s, first + j, axis);
+}
+
+/* Add omega x r, omega along z: the velocity of the tip by the turning of one frame. */
+static void add_speed(const double *restrict rate, Vector tip, Vector velocity) {
+    for (int j = 0; j < BLOCK; j++) {
+        velocity[0][j] -= rate[j] * tip[1][j];
+        velocity[1][j] += rate[j] * tip[0][j];
+    }
+}
+
+/* Write how far the tip moves under a load, eq. 2-9, and how fast the rigid tip goes; compliance/chain.py
+   says of which arrays. */
 EXPORT void compliance_displaced(Floats q_rad, Floats force_N, Floats moment_Nmm, Floats frames,
                                  Floats softness, Floats base, Floats tips_mm, Ints32 tool, Floats shift_mm,
-                                 Floats turn_rad) {
+                                 Floats turn_rad, Floats qd_rad_s, Floats velocity_mm_s) {
     Turns turns;
     Load load[FRAMES + 1];
     Carried state;
     Turn by;
-    const bool turned = turn_rad.rows > 0;
+    Scalar rate[FRAMES];
+    Vector velocity;
+    const bool turned = turn_rad.rows > 0, moves = velocity_mm_s.rows > 0;
     memset(load, 0, sizeof load);
+    memset(rate, 0, sizeof rate);
     memset(&state, 0, sizeof state);
     start_turns(&turns);
     for (int64_t first = 0; first < q_rad.rows; first += BLOCK) {
@@ -209,8 +228,15 @@ EXPORT void compliance_displaced(Floats q_rad, Floats force_N, Floats moment_Nmm
             outwards(load[i].moment, frame, turns.cos[i], turns.sin[i], load[i + 1].moment);
         }
         start(tips_mm, tool, first, rows, &state);
+        memset(velocity, 0, sizeof velocity);
+        if (moves)
+            rates_of(qd_rad_s, first, rows, rate);
         for (int i = FRAMES - 1; i >= 0; i--) {
             const double *frame = &CELL(frames, i, 0);
+            if (moves) {
+                add_speed(rate[i], state.tip, velocity);
+                inwards(velocity, frame, 0.0, 0.0, turns.cos[i], turns.sin[i]);
+            }
             yield(&load[i + 1], &CELL(softness, i, 0), state.tip, &by);
             move(&by, state.tip, state.shift);
             inwards(state.tip, frame, frame[2], frame[3], turns.cos[i], turns.sin[i]);
@@ -225,14 +251,8 @@ EXPORT void compliance_displaced(Floats q_rad, Floats force_N, Floats moment_Nmm
             to_rotation_vectors(rows, &state);
             give(state.turn.v, base, first, rows, turn_rad);
         }
-    }
-}
-
-/* Move the shift of the tip by omega x r, omega along z: the velocity by the turning of one frame. */
-static void add_speed(const double *restrict rate, Carried *restrict state) {
-    for (int j = 0; j < BLOCK; j++) {
-        state->shift[0][j] -= rate[j] * state->tip[1][j];
-        state->shift[1][j] += rate[j] * state->tip[0][j];
+        if (moves)
+            give(velocity, base, first, rows, velocity_mm_s);
     }
 }
 
@@ -248,13 +268,11 @@ EXPORT void compliance_tip(Floats q_rad, Floats qd_rad_s, Floats frames, Floats 
     for (int64_t first = 0; first < q_rad.rows; first += BLOCK) {
         const int64_t rows = least(BLOCK, q_rad.rows - first);
         turns_of(q_rad, first, rows, &turns);
-        for (int axis = 0; axis < AXES; axis++)
-            for (int64_t j = 0; j < rows; j++)
-                rate[AXIS_FRAME[axis]][j] = AXIS_SIGN[axis] * CELL(qd_rad_s, first + j, axis);
+        rates_of(qd_rad_s, first, rows, rate);
         start(tips_mm, tool, first, rows, &state);
         for (int i = FRAMES - 1; i >= 0; i--) {
             const double *frame = &CELL(frames, i, 0);
-            add_speed(rate[i], &state);
+            add_speed(rate[i], state.tip, state.shift);
             inwards(state.tip, frame, frame[2], frame[3], turns.cos[i], turns.sin[i]);
             inwards(state.shift, frame, 0.0, 0.0, turns.cos[i], turns.sin[i]);
         }

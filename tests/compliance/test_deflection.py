@@ -18,6 +18,7 @@ from gcode2krl.compliance import (
     tip_position,
     tip_velocity,
 )
+from gcode2krl.compliance.deflection import deflection_along
 from tests.compliance import independent
 from tests.compliance.loads import HOME, NONE, OTHER_GEOMETRY, other_cell, poses, random_load, vectors
 from tests.conftest import ROOT
@@ -48,6 +49,20 @@ class TestShares:
 
 
 class TestDeflection:
+    def test_along_joints_that_move_the_correction_is_normal_to_the_way_of_the_tip(self):
+        q, force, moment = random_load(1000, seed=20)
+        qd = np.random.default_rng(21).normal(size=(1000, 6))
+        qd[::7] = 0.0
+        cell = other_cell()
+        ahead, behind = (tip_position(q + step_s * qd, cell) for step_s in (1e-6, -1e-6))
+        way = (ahead - behind) @ cell.base_matrix()[:3, :3]
+        tool = np.full(1000, next(iter(cell.tool)), dtype=np.int32)
+        bent, correction = deflection_along(q, qd, force, moment, cell, tool)
+        expected, normal = deflection_of(q, force, moment, way, cell)
+        np.testing.assert_array_equal(bent, expected)
+        np.testing.assert_allclose(correction, normal, rtol=0, atol=1e-7)
+        np.testing.assert_array_equal(correction[::7], -bent[::7])
+
     def test_is_along_base_and_the_correction_normal_to_the_feed(self):
         q, force, moment = random_load(1000, seed=10)
         feed = np.random.default_rng(11).normal(size=(1000, 3))

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import re
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
-from gcode2krl.prediction.limits import cycle_acceleration
-from gcode2krl.tables import Motion
+from gcode2krl.prediction.limits import DeflectionLimit, cycle_acceleration
+from gcode2krl.tables import Deflection, Motion
 from gcode2krl.units import GRAVITY_M_S2
 from tests.cells import over_demonstration
 
@@ -186,3 +187,31 @@ def test_rapids_at_the_default_speed_are_no_finding_and_faster_ones_are():
     text = HEAD + "G0 X0 Y0\nG0 X400\nG0 Y400\nG0 X0\nG0 Y0\nG0 Z2\nG1 Z-5 F600\nG1 X60\nG0 Z30\n"
     assert not found(predicted(text), "acceleration-high")
     assert found(predicted(text, controller={"model": "KRC4", "rapid_m_s": 1.5}), "acceleration-high")
+
+
+def test_the_first_of_the_longest_deflections_counts():
+    """Rounded to tenths many are equally long; one that is not known counts as none."""
+    chance = np.random.default_rng(5)
+    limit = DeflectionLimit(over_demonstration())
+    bent_mm, across_mm = np.round(chance.normal(size=(2, 900, 3)), 1)
+    reached = chance.random(900) < 0.9
+    bent_mm[~reached] = across_mm[~reached] = np.nan
+    line = np.arange(100, 1000, dtype=np.int32)
+    for rows in np.array_split(np.arange(900), 7):
+        deflection = Deflection(deflection_base_mm=bent_mm[rows], correction_base_mm=across_mm[rows])
+        limit.take(deflection, reached[rows], line[rows])
+    assert limit.absurd is None
+    for largest, vectors_mm in ((limit.bent, bent_mm), (limit.across, across_mm)):
+        length_mm = np.nan_to_num([math.hypot(*vector) for vector in vectors_mm])
+        assert largest.value == pytest.approx(length_mm.max(), rel=1e-15)
+        assert largest.line == 100 + np.flatnonzero(np.isclose(length_mm, length_mm.max(), rtol=1e-12))[0]
+
+
+@pytest.mark.parametrize("value", [math.inf, 1e200, 101.0])
+def test_a_deflection_that_is_reached_and_not_known_is_absurd(value):
+    bent_mm, line = np.zeros((50, 3)), np.arange(50, dtype=np.int32)
+    bent_mm[20:, 1], reached = value, np.arange(50) >= 30
+    limit = DeflectionLimit(over_demonstration())
+    limit.take(Deflection(deflection_base_mm=bent_mm, correction_base_mm=-bent_mm), reached, line)
+    assert limit.absurd is not None
+    assert limit.absurd.line == 30
