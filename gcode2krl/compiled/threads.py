@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 _END: Any = object()
-HELPER = "gcode2krl-helper"
+HELPER = "gcode2krl helper"
 """Name of the threads that stay for the next work."""
 _MOST_HELPERS = 256
 """More than are ever asked for at once: three stages with one a core."""

@@ -162,9 +162,9 @@ def _width(data: Floats, count: int, blocks: list[_Block]) -> int:
 def _read_raw(file: Path, block: _Block) -> Floats:
     """Return the file of values that a channel names, beside the header."""
     place = file.with_name(block.file) if block.file else file.with_suffix(".r64")
-    if not place.is_file():
-        place = file.with_suffix(".r64")
     try:
+        if not place.is_file():
+            place = file.with_suffix(".r64")
         size = place.stat().st_size // 8
         data = np.fromfile(place, dtype="<f8", count=size)
     except OSError as error:

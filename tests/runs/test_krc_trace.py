@@ -234,6 +234,14 @@ def test_any_data_set_comes_back(tmp_path_factory, rows, factors, offsets, step,
         assert np.array_equal(channel.values, raw[:, n] * factors[n] + offsets[n])
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path):
+    t = np.arange(50) * 0.004
+    file = data_set(tmp_path, "c_KRCIpo", 0.004, [("X_Act", "mm", t, 1.0, 0.0)])
+    file.write_text(file.read_text("latin-1").replace("C:\\TRACE\\c_KRCIpo.r64", "9" * 400), "latin-1")
+    with pytest.raises(NotUnderstoodError, match="cannot read 999"):
+        read_data_set(file)
+
+
 def test_a_time_channel_with_values(tmp_path):
     t = np.arange(50) * 0.004
     file = data_set(
