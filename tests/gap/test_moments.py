@@ -7,7 +7,7 @@ import pytest
 
 from gcode2krl.effects import library
 from gcode2krl.gap.answer.causes import moment_of
-from gcode2krl.gap.compare.jumps import jumps, strongest_moments
+from gcode2krl.gap.compare.jumps import jump_clarity, strongest_moments
 from gcode2krl.gap.compare.trace import Event, Whose
 from gcode2krl.gap.components import Signatures, blocks_from
 from gcode2krl.gap.posterior.least_squares import free_of
@@ -32,7 +32,7 @@ def test_a_jump_is_as_surprising_as_least_squares_say():
     cubic = np.vander(np.linspace(-1.0, 1.0, 2 * half), 4)
     both = np.column_stack([cubic, np.arange(2 * half) >= half])
     left = [np.sum((window - a @ np.linalg.lstsq(a, window, rcond=None)[0]) ** 2) for a in (cubic, both)]
-    found = jumps(values, half)
+    found = jump_clarity(values, half)
     assert found[row] == pytest.approx(2 * half * np.log(left[0] / left[1]), rel=1e-6)
     assert np.argmax(found) == row
     assert not found[:half].any()

@@ -52,7 +52,7 @@ def jump_within(trace: Trace, span_s: Span) -> float | None:
     first, last = max(int(first) - half, 0), min(int(last) + half + 1, len(time_s))
     if last - first <= 2 * half:
         return None
-    clear = np.sum([jumps(column, half) for column in _without_clock(trace)[first:last].T], axis=0)
+    clear = np.sum([jump_clarity(column, half) for column in _without_clock(trace)[first:last].T], axis=0)
     row = first + int(np.argmax(clear))
     return float(time_s[row - 1] + time_s[row]) / 2.0 if clear.max() >= _LIMITS.least_jump else None
 
@@ -63,7 +63,7 @@ def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
     half = max(3, round(half_s / step_s))
     if len(trace.time_s) < 2 * half:
         return []
-    clear = np.sum([jumps(column, half) for column in _without_clock(trace).T], axis=0)
+    clear = np.sum([jump_clarity(column, half) for column in _without_clock(trace).T], axis=0)
     peaks: list[tuple[int, float]] = []
     for row in np.argsort(-clear):
         if clear[row] < _LIMITS.least_jump or len(peaks) == _LIMITS.jumps:
@@ -84,7 +84,7 @@ def _without_clock(trace: Trace) -> Floats:
     return without
 
 
-def jumps(values: Floats, half: int) -> Floats:
+def jump_clarity(values: Floats, half: int) -> Floats:
     """Return how surprising a jump before each row of (n,) is; 0 within ``half`` rows of the ends."""
     rows = (np.arange(2 * half) - (half - 0.5)) / half
     smooth = np.linalg.qr(np.vander(rows, _SMOOTH + 1))[0]
