@@ -1,16 +1,13 @@
 """Every physical key of the cell has a usual and a possible range with a source; types are strict."""
 
-import tomllib
 import types
 import typing
-from dataclasses import asdict
-from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
 
 from gcode2krl import load_cell
-from gcode2krl.cell import Cell, ranges, resolve_cell
+from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cell.ranges import all_ranges, general, range_issues
 from gcode2krl.errors import NotUnderstoodError
 from tests.cells import over_demonstration
@@ -52,14 +49,6 @@ def test_every_physical_key_has_a_range_and_every_range_a_key():
         and not key.startswith("effects")
     }
     assert physical == known
-
-
-def test_the_table_is_read_as_toml_reads_it():
-    table = tomllib.loads(Path(ranges.__file__).with_name("ranges.toml").read_text(encoding="utf-8"))
-    for key, row in table.items():
-        row |= {name: tuple(row[name]) for name in ("plausible", "possible")}
-        assert asdict(all_ranges()[key]) == row
-    assert len(table) == len(all_ranges())
 
 
 def test_every_range_has_a_source_and_lies_inside_the_possible():
