@@ -87,7 +87,7 @@ def plan_course(
         lambda: krc4.motion_issues(chain, profile, free, cell, simplify_mm),
         lambda: krc4.corner_issues(targets, chain, profile, free, cell),
     ]
-    issues = [issue for issues in in_threads(lambda found: found(), findings) for issue in issues]
+    issues = [issue for issues in in_threads(lambda finding: finding(), findings) for issue in issues]
     slower, slowed, planned_s = chain, chain.speed_mm_s, profile.total_s
     for trial in range(_SLOWING_ROUNDS + 1):
         course = krc4.Course(targets, slower, profile, cell, dt_s)

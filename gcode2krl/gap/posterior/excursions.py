@@ -46,8 +46,6 @@ _LEAST_ROWS = 3
 """Times the components: of fewer rows any noise goes one way."""
 _HOLES = 2.0
 """Times its width a window may last over rows that are left out."""
-
-
 _PLACES = 8
 """Of a jump within the width of a window."""
 _TONES = 8
@@ -81,11 +79,11 @@ def with_excursions(likelihood: Likelihood, residuals: Sequence[Floats]) -> tupl
     return tuple(_with_events(trace, i, kept, residuals[i]) for i, trace in enumerate(traces))
 
 
-def _is_near(trace: Trace, one: _Window, other: _Window) -> bool:
+def _is_near(trace: Trace, window: _Window, other: _Window) -> bool:
     """Tell whether two windows are of one event."""
-    if one.number != other.number:
+    if window.number != other.number:
         return False
-    first, last = max(one.first, other.first), min(one.last, other.last) - 1
+    first, last = max(window.first, other.first), min(window.last, other.last) - 1
     return bool(trace.time_s[first] - trace.time_s[last] < max(_LIMITS.excursion_widths_s))
 
 
@@ -130,8 +128,8 @@ def _of_width(
     spread = max(float(np.median(share / usual)), 1.0) if len(n) else 1.0
     p = betainc((n - k) / 2.0, k / 2.0, 1.0 - np.minimum(share / spread, 1.0))
     surprise = -np.log(np.maximum(p, 1e-300)) - np.log(len(n) * searches)
-    for own, (number, first, last) in zip(surprise.tolist(), place.tolist(), strict=True):
-        yield own, number, first, last
+    for nats, (number, first, last) in zip(surprise.tolist(), place.tolist(), strict=True):
+        yield nats, number, first, last
 
 
 def one_way(rows: Floats, first: Ints, half: int, halves: int = 1) -> Floats:
@@ -181,8 +179,8 @@ def _is_of_levels(likelihood: Likelihood, residual: Floats, window: _Window) -> 
         for i, begin in enumerate(at[:-1].tolist())
     ]
     values = rows @ along
-    one = max(steps.T, key=lambda step: _gain(values, level, step))
-    of_levels = max(_gain(values, level, one, step) for step in steps.T)
+    best_step = max(steps.T, key=lambda step: _gain(values, level, step))
+    of_levels = max(_gain(values, level, best_step, step) for step in steps.T)
     of_tones = max(_gain(values, level, *wave.T) for wave in waves)
     of_pulls = max(_gain(values, level, pull) for of_begin in pulls for pull in of_begin.T)
     of_one_level, best = _gain(values, level), max(of_tones, of_pulls)

@@ -478,13 +478,13 @@ class _Asked:
 
     def add(self, evidences: Iterable[Evidence | None]) -> None:
         """Take evidences; a None said nothing."""
-        for each in evidences:
-            if each is not None:
-                self.unbounded = max(self.unbounded, each.unbounded)
-                self.flipped = np.maximum(self.flipped, each.flipped)
-                known = self.best.get(each.key)
-                if known is None or each.nats > known.nats:
-                    self.best[each.key] = each
+        for evidence in evidences:
+            if evidence is not None:
+                self.unbounded = max(self.unbounded, evidence.unbounded)
+                self.flipped = np.maximum(self.flipped, evidence.flipped)
+                known = self.best.get(evidence.key)
+                if known is None or evidence.nats > known.nats:
+                    self.best[evidence.key] = evidence
 
 
 def studies(rows: Rows, views: Sequence[View], grid: Grid, seed: int = 0) -> list[Study]:
