@@ -99,8 +99,8 @@ def identify_sensor(
     gravity /= np.linalg.norm(gravity)
     down = np.einsum("nji,j->ni", fr.rotation_from_quaternion(poses.rotation), gravity)
     _require_spread(down, poses.source)
-    force = _Fit.of(_force_slope(down), poses.force_N, noise_N, level)
-    moment = _Fit.of(_moment_slope(down), poses.moment_Nmm, noise_Nmm, level)
+    force = _Weighed.of(_force_slope(down), poses.force_N, noise_N, level)
+    moment = _Weighed.of(_moment_slope(down), poses.moment_Nmm, noise_Nmm, level)
     weight = force.estimate(0)
     if weight.high - weight.value > _WIDEST * abs(weight.value):
         raise _refused(
@@ -144,7 +144,7 @@ def identify_sensor(
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _Weighed:
     """A linear least squares with the interval of each value."""
 
     value: Floats
@@ -152,7 +152,7 @@ class _Fit:
     noise: float
 
     @classmethod
-    def of(cls, slope: Floats, readings: Floats, stated: float, level: float) -> "_Fit":
+    def of(cls, slope: Floats, readings: Floats, stated: float, level: float) -> "_Weighed":
         """Fit (n, 3) readings with slopes (n, 3, p)."""
         rows = slope.reshape(-1, slope.shape[2])
         value, *_ = np.linalg.lstsq(rows, readings.ravel(), rcond=None)
@@ -180,7 +180,7 @@ def _moment_slope(down: Floats) -> Floats:
     return np.concatenate([np.cross(np.eye(3), down[:, None, :]).swapaxes(1, 2), unit], axis=2)
 
 
-def _centre(force: _Fit, moment: _Fit) -> Triple:
+def _centre(force: _Weighed, moment: _Weighed) -> Triple:
     """Return r = s/W; the intervals of s and W, independent of each other, are carried over linearly."""
     weight, wide = float(force.value[0]), float(force.half[0])
     centre = []

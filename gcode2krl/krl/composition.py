@@ -32,7 +32,7 @@ from gcode2krl.krl.rsi_text import DECLARATIONS as RSI_DECLARATIONS
 from gcode2krl.krl.rsi_text import RsiText, rsi_rows
 from gcode2krl.krl.versions import version_lines
 from gcode2krl.program.arcs import Arc
-from gcode2krl.program.splines import Chain
+from gcode2krl.program.splines import SplineBlock
 from gcode2krl.tables import Joints, Targets
 from gcode2krl.units import DEG_PER_RAD, MM_PER_M
 from gcode2krl.version import __version__
@@ -89,7 +89,7 @@ class TextLayout:
     """What was checked for collisions; None: nothing."""
     arcs: tuple[Arc, ...] = ()
     """Rows that are written as CIRC."""
-    splines: tuple[Chain, ...] = ()
+    splines: tuple[SplineBlock, ...] = ()
     """Rows that are written as SPLINE blocks."""
 
 
@@ -142,10 +142,10 @@ class _Composer:
         rows = [*self.events, self.rsi.off] if self.rsi is not None else [*self.events]
         self.event_rows = np.array(sorted(rows), dtype=np.int64)
 
-    def _curves(self) -> list[Arc | Chain]:
+    def _curves(self) -> list[Arc | SplineBlock]:
         """Return the arcs and splines that are written as such: one over the end of a part stays chords."""
         starts, ends = np.array([(start, end) for start, end, _ in self.chunks]).T
-        curves: list[Arc | Chain] = [*self.layout.arcs, *self.layout.splines]
+        curves: list[Arc | SplineBlock] = [*self.layout.arcs, *self.layout.splines]
         curves.sort(key=lambda curve: curve.first)
         of_chunk = np.searchsorted(starts, [curve.first for curve in curves], side="right") - 1
         return [curve for curve, k in zip(curves, of_chunk, strict=True) if curve.end < ends[k]]
@@ -341,7 +341,7 @@ class _Composer:
         )
         return head + f"{w.CIRC} {{{via}}},{{".encode("ascii") + end
 
-    def _spline(self, chain: Chain, state: Floats) -> bytes:
+    def _spline(self, chain: SplineBlock, state: Floats) -> bytes:
         """Return a SPLINE block, with what is set before it as before a LIN."""
         text = b"".join(self._lines(chain.first, chain.end + 1, state, passes=True))
         head, _, points = text.partition(_LIN)
@@ -453,7 +453,7 @@ class _Composer:
             cell=self.cell,
             motions=len(self.targets) - sum(arc.end - arc.first for arc in arcs),
             arcs=len(arcs),
-            splines=sum(isinstance(curve, Chain) for curve in self.curves),
+            splines=sum(isinstance(curve, SplineBlock) for curve in self.curves),
             options=options,
             allowed=allowed,
             cell_hashes=hash_lines(
@@ -502,7 +502,7 @@ class _Composer:
         yield from (text for events in self.events.values() for _, text in events)
         away = int(np.argmin(self.targets.home))
         yield self._ptp(away)
-        if any(isinstance(curve, Chain) for curve in self.curves):
+        if any(isinstance(curve, SplineBlock) for curve in self.curves):
             yield w.SPLINE
         if self.pilot is not None and self.pilot.triggers is not None and len(self.pilot.triggers.row):
             first = int(self.pilot.triggers.row[0])

@@ -31,7 +31,7 @@ from gcode2krl.krl.versions import version_issues
 from gcode2krl.prediction import Prediction
 from gcode2krl.prediction.forecast import Forecast
 from gcode2krl.program.arcs import Arc, arcs_of
-from gcode2krl.program.splines import Chain, splines_of
+from gcode2krl.program.splines import SplineBlock, splines_of
 from gcode2krl.tables import Joints, Targets, Toolpath
 from gcode2krl.units import BYTES_PER_MB
 
@@ -236,7 +236,7 @@ def _forecast_of(
 
 def _curves(
     targets: Targets, cell: Cell, pilot: PilotForm | None, *, is_online: bool
-) -> tuple[list[Arc], list[Chain], list[Issue]]:
+) -> tuple[list[Arc], list[SplineBlock], list[Issue]]:
     """Return what becomes CIRC and SPLINE, and what there is to say of that where the cell asks for it.
 
     The triggers of a pilot force and RSI count on motions as they are predicted, so they need the chords: a
@@ -268,7 +268,7 @@ def _about_arcs(arcs: list[Arc], targets: Targets, cell: Cell) -> Iterator[Issue
         yield Issue("note", "circ", 0, sentence, "measure one with the controller's trace")
 
 
-def _about_splines(splines: list[Chain]) -> Iterator[Issue]:
+def _about_splines(splines: list[SplineBlock]) -> Iterator[Issue]:
     if splines:
         points = sum(chain.end - chain.first + 1 for chain in splines)
         sentence = (

@@ -27,7 +27,7 @@ OFF_MM = 0.02
 """How far a curve through the points may be beside the chords."""
 
 
-class Chain(NamedTuple):
+class SplineBlock(NamedTuple):
     """Rows of Targets that become one SPLINE block; it begins where the row before ends, at rest."""
 
     first: int
@@ -42,7 +42,7 @@ def with_stops(targets: Targets, is_circ: bool) -> Targets:
     return replace(targets, cdis_mm=cdis)
 
 
-def splines_of(targets: Targets, is_circ: bool) -> list[Chain]:
+def splines_of(targets: Targets, is_circ: bool) -> list[SplineBlock]:
     """Return the chains between whose ends the robot does not stop, in their order."""
     return [
         chain
@@ -51,7 +51,7 @@ def splines_of(targets: Targets, is_circ: bool) -> list[Chain]:
     ]
 
 
-def _chains(targets: Targets, is_circ: bool) -> list[Chain]:
+def _chains(targets: Targets, is_circ: bool) -> list[SplineBlock]:
     """Return the runs of moves that are one smooth chain; arcs that become CIRC are left out."""
     smooth = _goes_on(targets)
     if is_circ:
@@ -59,7 +59,7 @@ def _chains(targets: Targets, is_circ: bool) -> list[Chain]:
             smooth[arc.first - 1 : arc.end + 1] = False
     border = np.flatnonzero(np.diff(np.concatenate([[0], smooth.astype(np.int8), [0]])))
     return [
-        Chain(first, end)
+        SplineBlock(first, end)
         for first, end in border.reshape(-1, 2).tolist()
         if FEWEST <= end - first + 1 <= MOST and first > 0
     ]

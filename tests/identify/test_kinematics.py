@@ -22,7 +22,7 @@ from gcode2krl.identify.kinematics import (
     read_readings,
 )
 from gcode2krl.identify.kinematics.cell_section import section_of
-from gcode2krl.identify.kinematics.parameters import GROUPS, Poses, flange_of, model_of
+from gcode2krl.identify.kinematics.parameters import GROUPS, ArmPoses, flange_of, model_of
 from gcode2krl.robot import forward
 from gcode2krl.robot.kinematics import flange_pose
 from tests.conftest import ROOT
@@ -90,7 +90,7 @@ def test_an_arm_with_three_parallel_axes_is_its_makers_table():
 @pytest.mark.parametrize("model", ["KR 6 R900-2", "UR10"])
 def test_slopes_are_those_of_differences(model):
     q = RNG.uniform(-1.2, 1.2, (7, 6))
-    rows = Poses(
+    rows = ArmPoses(
         q_rad=q,
         measured_mm=RNG.uniform(-900.0, 900.0, (7, 3)),
         target=np.array([0, 1] * 3 + [0]),

@@ -2,9 +2,9 @@
 
 from gcode2krl.identify.kinematics.arms import Arm, all_arms, arm_named, arm_of
 from gcode2krl.identify.kinematics.identification import (
+    ArmNumber,
     Geometry,
     Options,
-    Part,
     identify_kinematics,
     tips_of,
 )
@@ -14,9 +14,9 @@ from gcode2krl.identify.kinematics.readings import Readings, read_readings
 __all__ = [
     "GEOMETRY",
     "Arm",
+    "ArmNumber",
     "Geometry",
     "Options",
-    "Part",
     "Readings",
     "all_arms",
     "arm_named",

@@ -13,7 +13,7 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.identify.kinematics.fit import Fit, steps_of
-from gcode2krl.identify.kinematics.parameters import Model, Poses
+from gcode2krl.identify.kinematics.parameters import ArmPoses, Model
 from gcode2krl.units import DEG_PER_RAD, RAD_PER_DEG
 
 _HAT_RAD = 4.0 * RAD_PER_DEG
@@ -42,7 +42,7 @@ class Curves:
 
 
 def curves_of(
-    model: Model, fit: Fit, poses: Poses, places: Ints, after_mm: Floats, signs: Sequence[float]
+    model: Model, fit: Fit, poses: ArmPoses, places: Ints, after_mm: Floats, signs: Sequence[float]
 ) -> Curves | None:
     """Return the curves; None where they bring less than a fifth at places left out, or the poses are few.
 

@@ -13,7 +13,7 @@ from gcode2krl.identify.kinematics.alignment import Alignment, aligned
 from gcode2krl.identify.kinematics.arms import Arm, all_arms
 from gcode2krl.identify.kinematics.curves import Curves, curves_of
 from gcode2krl.identify.kinematics.fit import Fit, fitted, steps_of
-from gcode2krl.identify.kinematics.parameters import GEOMETRY, GROUPS, Model, Poses, flange_of, model_of
+from gcode2krl.identify.kinematics.parameters import GEOMETRY, GROUPS, ArmPoses, Model, flange_of, model_of
 from gcode2krl.identify.kinematics.readings import Readings, approach_by_order
 from gcode2krl.units import MM_PER_M, RAD_PER_DEG
 
@@ -55,7 +55,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Part:
+class ArmNumber:
     """One small number: its estimate in its unit, and whether the poses tell it."""
 
     name: str
@@ -75,7 +75,7 @@ class Geometry:
 
     source: str
     robot: str
-    parts: tuple[Part, ...]
+    parts: tuple[ArmNumber, ...]
     before_mm: Floats
     """(n,) distance of each point from the arm without errors, with base and tool fitted."""
     after_mm: Floats
@@ -124,7 +124,7 @@ class Geometry:
         return None if self.curves is None else _rms(self.curves.after_mm[~self.is_outlier])
 
     @property
-    def told(self) -> tuple[Part, ...]:
+    def told(self) -> tuple[ArmNumber, ...]:
         """The arm's own numbers that the poses tell and whose interval leaves out 0."""
         return tuple(
             part
@@ -259,7 +259,7 @@ def _which_fits(readings: Readings) -> str:
     return f"{best[0]} would be {best[1]:.1f} mm off" if best[1] < 20.0 else "no arm that is known fits"
 
 
-def _poses(readings: Readings, q_rad: Floats, arm: Arm, options: Options) -> tuple[Poses, Ints]:
+def _poses(readings: Readings, q_rad: Floats, arm: Arm, options: Options) -> tuple[ArmPoses, Ints]:
     """Return the rows, one a target that was seen, and the pose (m,) of each."""
     count = readings.measured.shape[1]
     is_seen = np.isfinite(readings.measured).all(axis=2)
@@ -271,7 +271,7 @@ def _poses(readings: Readings, q_rad: Floats, arm: Arm, options: Options) -> tup
     span = float(np.ptp(time))
     course = 2.0 * (time - time.min()) / span - 1.0 if span > 0.0 else np.zeros(len(time))
     target = np.asarray(target if count > 1 else np.zeros(len(index), dtype=int))
-    poses = Poses(
+    poses = ArmPoses(
         q_rad=q_rad[index],
         measured_mm=readings.measured[is_seen],
         target=target,
@@ -283,7 +283,7 @@ def _poses(readings: Readings, q_rad: Floats, arm: Arm, options: Options) -> tup
     return poses, np.asarray(index)
 
 
-def _model(poses: Poses, arm: Arm, alignment: Alignment, options: Options, groups: Sequence[str]) -> Model:
+def _model(poses: ArmPoses, arm: Arm, alignment: Alignment, options: Options, groups: Sequence[str]) -> Model:
     base = (alignment.place_mm, alignment.rotation)
     gravity = np.array(options.gravity_root) / np.linalg.norm(options.gravity_root)
     return model_of(
@@ -318,7 +318,7 @@ def _same_pose(q_rad: Floats) -> Ints:
 # --- what is told ---------------------------------------------------------------------------------------
 
 
-def _parts(model: Model, fit: Fit, options: Options, oriented: bool) -> list[Part]:
+def _parts(model: Model, fit: Fit, options: Options, oriented: bool) -> list[ArmNumber]:
     steps = steps_of(model)
     deviation = np.sqrt(np.diag(fit.covariance)) * (np.sqrt(3.0) if oriented else 1.0)
     half = student(options.level, int(fit.freedom)) * deviation
@@ -330,7 +330,9 @@ def _parts(model: Model, fit: Fit, options: Options, oriented: bool) -> list[Par
         like = () if is_told else tuple(GROUPS[g] for g in _partners(at, shares, groups))
         estimate = around(float(fit.theta[at] * number.size), float(half[at] * number.size))
         parts.append(
-            Part(number.name, number.group, number.unit, estimate, number.width * number.size, is_told, like)
+            ArmNumber(
+                number.name, number.group, number.unit, estimate, number.width * number.size, is_told, like
+            )
         )
     return parts
 
@@ -374,7 +376,7 @@ def _alike(model: Model, fit: Fit) -> list[tuple[str, str, float]]:
     return sorted(pairs, key=lambda pair: -pair[2])
 
 
-def _condition(fit: Fit, parts: Sequence[Part]) -> float:
+def _condition(fit: Fit, parts: Sequence[ArmNumber]) -> float:
     counted = np.array([part.is_told for part in parts])
     counted &= np.array([part.group in _OF_CONDITION for part in parts])
     columns = fit.slopes[:, counted]
@@ -387,7 +389,7 @@ def _condition(fit: Fit, parts: Sequence[Part]) -> float:
 
 
 def _noise(
-    options: Options, poses: Poses, index: Ints, q_rad: Floats, good: Bools
+    options: Options, poses: ArmPoses, index: Ints, q_rad: Floats, good: Bools
 ) -> tuple[float | None, str]:
     """Return the noise of one coordinate and where it is from."""
     if options.noise_mm > 0.0:
@@ -401,7 +403,7 @@ def _noise(
     return None, "unknown"
 
 
-def _again(poses: Poses, index: Ints, q_rad: Floats, good: Bools) -> Floats:
+def _again(poses: ArmPoses, index: Ints, q_rad: Floats, good: Bools) -> Floats:
     """Return deviations (m, 3) from the mean of a pose, each with the variance of one reading."""
     key = _same_pose(q_rad)[index] * (int(poses.target.max(initial=0)) + 1) + poses.target
     deviations = [np.zeros((0, 3))]
@@ -414,7 +416,7 @@ def _again(poses: Poses, index: Ints, q_rad: Floats, good: Bools) -> Floats:
     return np.concatenate(deviations)
 
 
-def _rigid(poses: Poses, index: Ints, good: Bools) -> Floats:
+def _rigid(poses: ArmPoses, index: Ints, good: Bools) -> Floats:
     """Return by how much distances between two targets of the tool differ from their mean."""
     differences = [np.zeros(0)]
     for other in range(1, int(poses.target.max(initial=0)) + 1):
@@ -431,7 +433,7 @@ def _rigid(poses: Poses, index: Ints, good: Bools) -> Floats:
     return np.concatenate(differences)
 
 
-def _repeatability(poses: Poses, index: Ints, q_rad: Floats) -> float | None:
+def _repeatability(poses: ArmPoses, index: Ints, q_rad: Floats) -> float | None:
     """Return ISO 9283's RP: mean distance from the barycentre and 3 of its standard deviations."""
     key = _same_pose(q_rad)[index]
     repeatabilities = []

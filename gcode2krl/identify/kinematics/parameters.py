@@ -38,7 +38,7 @@ class Motion:
 
 
 @dataclass(eq=False)
-class Chain:
+class MotionChain:
     """Elementary motions by name, in order from the frame in which is measured to the tip."""
 
     rows: int
@@ -147,7 +147,7 @@ class Number:
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class ArmPoses:
     """What is known of each row: one target on one pose."""
 
     q_rad: Floats
@@ -170,7 +170,7 @@ class Poses:
 class Model:
     """The chain of all rows and its small numbers; ``extras`` move the measured points themselves."""
 
-    chain: Chain
+    chain: MotionChain
     only: Container[str] | None = None
     numbers: list[Number] = field(default_factory=list)
     extras: list[tuple[int, Floats]] = field(default_factory=list)
@@ -223,14 +223,14 @@ class Model:
         return tip, moved
 
 
-def nominal_chain(q_rad: Floats, mm: Floats) -> Chain:
+def nominal_chain(q_rad: Floats, mm: Floats) -> MotionChain:
     """Return the chain of an arm without errors, of n rows in KUKA's joints and lengths (8,).
 
     Where A6 is offset along A5 (``d5``), A4 is parallel to A2 and A3: its axis, along the forearm of other
     arms, is turned by 90 deg, and a turn of it about the forearm is an error of its own.
     """
     a1, a2, b, c1, c2, c3, c4, d5 = mm
-    chain = Chain(len(q_rad))
+    chain = MotionChain(len(q_rad))
     for axis, letter in enumerate("xyz"):
         chain.shift(f"base {letter}", axis)
     for axis, letter in ((2, "z"), (1, "y"), (0, "x")):
@@ -273,7 +273,7 @@ def flange_of(q_rad: Floats, mm: Floats) -> tuple[Floats, Floats]:
 
 
 def model_of(
-    poses: Poses,
+    poses: ArmPoses,
     mm: Floats,
     base: tuple[Floats, Floats],
     tools_mm: Floats,
@@ -316,7 +316,7 @@ def model_of(
     return model
 
 
-def _place(chain: Chain, base: tuple[Floats, Floats], tip_mm: Floats) -> None:
+def _place(chain: MotionChain, base: tuple[Floats, Floats], tip_mm: Floats) -> None:
     """Put base and tool where they are about, so that their numbers are small."""
     place, rotation = base
     for axis, letter in enumerate("xyz"):
@@ -332,35 +332,35 @@ def _place(chain: Chain, base: tuple[Floats, Floats], tip_mm: Floats) -> None:
         chain.motions[f"base turn {letter}"].nominal = np.full(chain.rows, angle)
 
 
-def _add_zeros(model: Model, poses: Poses) -> None:
+def _add_zeros(model: Model, poses: ArmPoses) -> None:
     for joint in _JOINTS:
         model.add(f"A{joint} zero", "zeros", _ZERO_RAD, [(f"A{joint}", _SIGNS[joint - 1])], unit="deg")
 
 
-def _add_lengths(model: Model, poses: Poses) -> None:
+def _add_lengths(model: Model, poses: ArmPoses) -> None:
     for name in ("a1", "a2", "b", "c1", "c2", "c3", "c4"):
         model.add(name, "lengths", _LENGTH_MM, [(name, -1.0 if name == "a2" else 1.0)], unit="mm")
 
 
-def _add_axes(model: Model, poses: Poses) -> None:
+def _add_axes(model: Model, poses: ArmPoses) -> None:
     for name in ("A2 tilt", "A3 tilt", "A3 twist", "A4 tilt", "A4 twist", "A5 tilt", "A6 tilt"):
         if name in model.chain.motions:
             model.add(name, "axes", _AXIS_RAD, [(name, 1.0)], unit="mrad")
 
 
-def _add_wrist(model: Model, poses: Poses) -> None:
+def _add_wrist(model: Model, poses: ArmPoses) -> None:
     for name in ("A5 beside A4", "A5 across", "A6 beside A5"):
         model.add(name, "wrist", _WRIST_MM, [(name, 1.0)], unit="mm")
 
 
-def _add_play(model: Model, poses: Poses) -> None:
+def _add_play(model: Model, poses: ArmPoses) -> None:
     for name, motion, driver in _driven(poses):
         slope = _SIGNS[int(motion[1]) - 1] * poses.approach[:, driver - 1]
         if slope.any():
             model.add(f"{name}half play", "play", _PLAY_RAD, [(motion, slope)], unit="deg")
 
 
-def _add_gears(model: Model, poses: Poses) -> None:
+def _add_gears(model: Model, poses: ArmPoses) -> None:
     for name, motion, driver in _driven(poses):
         q, sign = poses.own_rad[:, driver - 1], _SIGNS[int(motion[1]) - 1]
         for form, wave in (("cos", np.cos(q)), ("sin", np.sin(q))):
@@ -371,13 +371,13 @@ def _add_gears(model: Model, poses: Poses) -> None:
         model.add(f"A{driven} with A{driver}", "gears", _COUPLING, [(f"A{driven}", slope)], unit="ppm")
 
 
-def _driven(poses: Poses) -> list[tuple[str, str, int]]:
+def _driven(poses: ArmPoses) -> list[tuple[str, str, int]]:
     """Return what to call a gear's error, the motion that it changes, and the joint whose gear it is."""
     gears = [(f"A{joint} ", f"A{joint}", joint) for joint in _JOINTS]
     return [*gears, ("A3 by A2's ", "A3", 2)] if poses.a3_by_a2 else gears
 
 
-def _add_drift(model: Model, poses: Poses) -> None:
+def _add_drift(model: Model, poses: ArmPoses) -> None:
     if not np.ptp(poses.time):
         return
     courses = {"": poses.time, "²": 1.5 * poses.time**2 - 0.5, "³": 2.5 * poses.time**3 - 1.5 * poses.time}
@@ -390,7 +390,7 @@ def _add_drift(model: Model, poses: Poses) -> None:
         )
 
 
-def _add_air(model: Model, poses: Poses) -> None:
+def _add_air(model: Model, poses: ArmPoses) -> None:
     """Add scale, and a beam that sinks with distance² from an instrument that stands anywhere."""
     middle = poses.measured_mm - poses.measured_mm.mean(axis=0)
     model.add("scale", "air", _SCALE, unit="ppm", extra=middle)
@@ -423,7 +423,7 @@ _BORNE = {
 }
 
 
-def _add_weight(model: Model, poses: Poses, down: Floats, masses_kg: Sequence[float] | None) -> None:
+def _add_weight(model: Model, poses: ArmPoses, down: Floats, masses_kg: Sequence[float] | None) -> None:
     """Add the joints' turns under gravity, along ``down`` (3,) in the instrument's frame.
 
     With masses each joint has its stiffness: a number is its turn under the largest torque of all poses.

@@ -12,7 +12,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.errors import input_error
 from gcode2krl.frames import rotation_from_abc, rotation_from_quaternion
 from gcode2krl.runs.foreign.names import FACTORS, meanings, unit_of
-from gcode2krl.runs.foreign.table import Table, read_table, table_of
+from gcode2krl.runs.foreign.table import LogTable, read_table, table_of
 from gcode2krl.units import RAD_PER_DEG
 
 _LEAST = 10
@@ -108,7 +108,7 @@ def read_readings(
     )
 
 
-def _targets(table: Table, given: Mapping[str, str]) -> dict[str, str]:
+def _targets(table: LogTable, given: Mapping[str, str]) -> dict[str, str]:
     """Return q1 …, x, y, z, … → column of the table."""
     for name in given:
         if name not in table.columns:
@@ -136,7 +136,7 @@ def _targets(table: Table, given: Mapping[str, str]) -> dict[str, str]:
     return {**{target: min(names)[1] for target, names in by_rank.items()}, **stated}
 
 
-def _need(table: Table, named: Mapping[str, str], targets: Sequence[str], what: str) -> list[str]:
+def _need(table: LogTable, named: Mapping[str, str], targets: Sequence[str], what: str) -> list[str]:
     missing = [target for target in targets if target not in named]
     if missing:
         words = f"no column is {', '.join(missing)} ({what}); the file has {', '.join(table.names)[:300]}"
@@ -144,7 +144,7 @@ def _need(table: Table, named: Mapping[str, str], targets: Sequence[str], what: 
     return [named[target] for target in targets]
 
 
-def _joints(table: Table, named: Mapping[str, str], stated: str) -> tuple[Floats, str]:
+def _joints(table: LogTable, named: Mapping[str, str], stated: str) -> tuple[Floats, str]:
     names = _need(table, named, [f"q{n}" for n in range(1, 7)], "joints")
     values = np.stack([table.columns[name] for name in names], axis=1)
     unit = _unit(table, names, stated, "angle")
@@ -155,7 +155,7 @@ def _joints(table: Table, named: Mapping[str, str], stated: str) -> tuple[Floats
     return values * FACTORS["angle"][unit] * RAD_PER_DEG, unit
 
 
-def _unit(table: Table, names: Sequence[str], stated: str, kind: str) -> str:
+def _unit(table: LogTable, names: Sequence[str], stated: str, kind: str) -> str:
     """Return the unit that a person, a line of units or a name states; "" where none does."""
     by_name = [meaning.unit for meaning in meanings(names).values()]
     units = (
@@ -167,7 +167,7 @@ def _unit(table: Table, names: Sequence[str], stated: str, kind: str) -> str:
     return known.pop() if len(known) == 1 else ""
 
 
-def _seen(table: Table, named: Mapping[str, str], stated: str) -> tuple[Floats, str]:
+def _seen(table: LogTable, named: Mapping[str, str], stated: str) -> tuple[Floats, str]:
     """Return the targets (n, t, 3) and their unit."""
     plain = {"x": "x", "y": "y", "z": "z"}
     sets = [plain] if "x" in named else []
@@ -183,7 +183,7 @@ def _seen(table: Table, named: Mapping[str, str], stated: str) -> tuple[Floats, 
 
 
 def _with_orientation(
-    table: Table, named: Mapping[str, str], targets: Floats, length_unit: str
+    table: LogTable, named: Mapping[str, str], targets: Floats, length_unit: str
 ) -> tuple[Floats, bool]:
     """Return three points around the tip where the orientation was measured too."""
     if targets.shape[1] > 1 or length_unit == "":
@@ -206,7 +206,7 @@ def _with_orientation(
     return targets + np.einsum("nij,tj->nti", rotation, around), True
 
 
-def _approach(table: Table, named: Mapping[str, str]) -> Floats | None:
+def _approach(table: LogTable, named: Mapping[str, str]) -> Floats | None:
     names = [named.get(f"approach_{joint}") for joint in range(1, 7)]
     if not any(names):
         return None

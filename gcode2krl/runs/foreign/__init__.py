@@ -1,6 +1,6 @@
 """Logs as other programs write them: which column is what, in which unit, and the run that they make."""
 
-from gcode2krl.runs.foreign.guess import ORDERS, Entry, Guess, Question, guessed
+from gcode2krl.runs.foreign.guess import ORDERS, ColumnQuestion, Entry, Guess, guessed
 from gcode2krl.runs.foreign.names import FACTORS
 from gcode2krl.runs.foreign.run import (
     absences,
@@ -15,15 +15,15 @@ from gcode2krl.runs.foreign.run import (
     write_native,
     write_run,
 )
-from gcode2krl.runs.foreign.table import Table, read_table, table_of
+from gcode2krl.runs.foreign.table import LogTable, read_table, table_of
 
 __all__ = [
     "FACTORS",
     "ORDERS",
+    "ColumnQuestion",
     "Entry",
     "Guess",
-    "Question",
-    "Table",
+    "LogTable",
     "absences",
     "earlier_layout",
     "guess_of",

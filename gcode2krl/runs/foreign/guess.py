@@ -14,7 +14,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.errors import input_error
 from gcode2krl.runs.foreign.beside_plan import JointFit, Plan, joint_fit, length_unit, time_units
 from gcode2krl.runs.foreign.names import FACTORS, Meaning, kind_of, meanings, unit_of
-from gcode2krl.runs.foreign.table import Table
+from gcode2krl.runs.foreign.table import LogTable
 from gcode2krl.runs.head import Layout
 
 ORDERS = {
@@ -63,7 +63,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Question:
+class ColumnQuestion:
     """What only a person can say, and the option that says it."""
 
     text: str
@@ -74,11 +74,11 @@ class Question:
 class Guess:
     """The columns of a table with what they are taken for; certain where there is no question."""
 
-    table: Table
+    table: LogTable
     entries: tuple[Entry, ...]
     left_out: tuple[str, ...]
     order: str
-    questions: tuple[Question, ...] = ()
+    questions: tuple[ColumnQuestion, ...] = ()
     notes: tuple[str, ...] = ()
     clock_s: float = 0.0
     """Where the prediction starts on the table's clock."""
@@ -109,7 +109,7 @@ class Guess:
 
 
 def guessed(
-    table: Table,
+    table: LogTable,
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
@@ -158,7 +158,7 @@ def guessed(
 
 
 def _require_answers(
-    table: Table, columns: Mapping[str, str], units: Mapping[str, str], order: str, joints: str
+    table: LogTable, columns: Mapping[str, str], units: Mapping[str, str], order: str, joints: str
 ) -> None:
     for name in columns:
         if name not in table.columns:
@@ -199,7 +199,7 @@ def _reordered(target: str, joints: str) -> str:
 
 
 def _without_quaternion(
-    table: Table, known: Mapping[str, Meaning], columns: Mapping[str, str]
+    table: LogTable, known: Mapping[str, Meaning], columns: Mapping[str, str]
 ) -> dict[str, Meaning]:
     """Return the columns without Q0 to Q3 that are a quaternion, whose order the name does not tell."""
     names = [name for name, m in known.items() if re.fullmatch(r"q\d_act", m.target) and name not in columns]
@@ -210,7 +210,7 @@ def _without_quaternion(
     return dict(known)
 
 
-def _once(table: Table, known: Mapping[str, Meaning], columns: Mapping[str, str]) -> dict[str, Meaning]:
+def _once(table: LogTable, known: Mapping[str, Meaning], columns: Mapping[str, str]) -> dict[str, Meaning]:
     """Return the first column of each target, those that a person named before others, a row count last."""
     ordered = sorted(
         known,
@@ -226,14 +226,14 @@ def _once(table: Table, known: Mapping[str, Meaning], columns: Mapping[str, str]
 class _Work:
     """The state of a guess: meanings by name, what was said, and what is open."""
 
-    table: Table
+    table: LogTable
     known: dict[str, Meaning]
     stated: dict[str, str]
     plan: Plan | None
     said: str
     order: str = ""
     clock_s: float = 0.0
-    questions: list[Question] = field(default_factory=list)
+    questions: list[ColumnQuestion] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def name_of(self, target: str) -> str | None:
@@ -250,7 +250,7 @@ class _Work:
         """Find the time and its unit."""
         if self.name_of("t") is None:
             words = "no column is the time; the file has " + ", ".join(self.table.names)[:300]
-            self.questions.append(Question(words, "--columns NAME=t"))
+            self.questions.append(ColumnQuestion(words, "--columns NAME=t"))
             return
         name = str(self.name_of("t"))
         values = self.table.columns[name]
@@ -261,7 +261,7 @@ class _Work:
         fit = self._cycles(values)
         if _counts(values):
             words = f"{name}: counts the rows; is it the time, and in which unit?"
-            self.questions.append(Question(words, f"--unit time={'|'.join(fit)} or --columns NAME=t"))
+            self.questions.append(ColumnQuestion(words, f"--unit time={'|'.join(fit)} or --columns NAME=t"))
             return
         if len(fit) > 1 and self.plan is not None:
             fit = [unit for unit in fit if unit in time_units(values, self.plan)] or fit
@@ -269,7 +269,7 @@ class _Work:
             self.set_unit([name], fit[0], f"{_step(values) * FACTORS['time'][fit[0]]:.4g} s between rows")
         else:
             words = f"{name}: {_step(values):g} between rows, {' or '.join(fit) if fit else 'of what unit'}?"
-            self.questions.append(Question(words, f"--unit time={'|'.join(fit) or 'UNIT'}"))
+            self.questions.append(ColumnQuestion(words, f"--unit time={'|'.join(fit) or 'UNIT'}"))
 
     def _cycles(self, values: Floats) -> list[str]:
         """Return the units in which rows are as far apart as recorders write them, and dates are dates."""
@@ -285,7 +285,7 @@ class _Work:
             return
         cycle_s = _step(values) * FACTORS["time"][unit]
         words = f"{name}: in {unit} there are {cycle_s:.3g} s between rows; is it {' or '.join(fit)}?"
-        self.questions.append(Question(words, f"--unit time={'|'.join([*fit, unit])}"))
+        self.questions.append(ColumnQuestion(words, f"--unit time={'|'.join([*fit, unit])}"))
 
     def _is_sure(self, name: str) -> bool:
         """Tell whether a person has said the unit of a column of this table."""
@@ -339,7 +339,7 @@ class _Work:
         span = f"{names[0]}{f' … {names[-1]}' if len(names) > 1 else ''}"
         if _NEEDED.fullmatch(self.known[names[0]].target):
             words = f"{span}: up to {largest:.4g}, {' or '.join(usual)}?"
-            self.questions.append(Question(words, option))
+            self.questions.append(ColumnQuestion(words, option))
             return
         self.notes.append(f"{span}: left out, its unit is not stated ({option})")
         for name in names:
@@ -374,12 +374,12 @@ class _Work:
         planned = self._by_plan(names, kind)
         if largest * size > most:
             words = f"{names[0]} … {names[-1]}: up to {largest:.4g} {unit}, which no robot has"
-            self.questions.append(Question(words, f"--unit {kind}={usual}"))
+            self.questions.append(ColumnQuestion(words, f"--unit {kind}={usual}"))
         elif planned and planned != unit:
             words = (
                 f"{names[0]} … {names[-1]}: stated in {unit}, but they move as the prediction in {planned}"
             )
-            self.questions.append(Question(words, f"--unit {kind}={planned}|{unit}"))
+            self.questions.append(ColumnQuestion(words, f"--unit {kind}={planned}|{unit}"))
 
     def time_s(self) -> Floats | None:
         """Return the stamps (n,) in s from the first one; None where they are not known."""
@@ -417,11 +417,11 @@ class _Work:
             if fit.certain and fit.order != (0, 1, 2, 3, 4, 5) and not said:
                 digits = "".join(str(column + 1) for column in fit.order)
                 words = f"{names[0]} … {names[5]} move as A{', A'.join(digits)} of the prediction"
-                self.questions.append(Question(words, f"--joints {digits}"))
+                self.questions.append(ColumnQuestion(words, f"--joints {digits}"))
             return
         if free and any(re.fullmatch(r"q\d_\w+", m.target) for m in self.known.values()):
             words = "the joints are numbered as the message lists them, which need not be A1 to A6"
-            self.questions.append(Question(words, "--joints 123456 (321456: A3 is the first)"))
+            self.questions.append(ColumnQuestion(words, "--joints 123456 (321456: A3 is the first)"))
 
     def settle_orientation(self, order: str) -> None:
         """Find the order of three angles; without one they are left out."""
@@ -439,7 +439,7 @@ class _Work:
         if not any(_NEEDED.fullmatch(m.target) for m in self.known.values() if m.target != "t"):
             names = ", ".join(self.table.names)[:300]
             words = f"no column is a joint, a position or a force; the file has {names}"
-            self.questions.append(Question(words, "--columns NAME=q1_act …"))
+            self.questions.append(ColumnQuestion(words, "--columns NAME=q1_act …"))
 
     def guess(self) -> Guess:
         """Return the guess as it stands."""
@@ -471,19 +471,19 @@ def _counts(values: Floats) -> bool:
     return len(steps) > 0 and bool((steps == 1.0).all())
 
 
-def _entry(table: Table, name: str, meaning: Meaning) -> Entry:
+def _entry(table: LogTable, name: str, meaning: Meaning) -> Entry:
     values = table.columns[name]
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     return Entry(name, meaning.target, kind_of(meaning.target), meaning.unit, meaning.why, low, high)
 
 
-def same_columns(layout: Layout, table: Table) -> bool:
+def same_columns(layout: Layout, table: LogTable) -> bool:
     """Tell whether a layout is that of a table: all of its columns are there."""
     return bool(layout.columns) and set(layout.columns) <= set(table.columns)
 
 
-def by_layout(table: Table, layout: Layout, prediction: Predicted | None = None) -> Guess:
+def by_layout(table: LogTable, layout: Layout, prediction: Predicted | None = None) -> Guess:
     """Return the guess that an earlier ``run.toml`` keeps; no column but its own is read."""
     others = {name: "" for name in table.columns if name not in layout.columns}
     columns = {**layout.columns, **others}

@@ -18,7 +18,7 @@ from gcode2krl.runs.diadem import is_data_set
 from gcode2krl.runs.folder import Run, assembled, load_run
 from gcode2krl.runs.foreign.guess import ORDERS, Entry, Guess, Predicted, by_layout, guessed, same_columns
 from gcode2krl.runs.foreign.names import FACTORS, kind_of
-from gcode2krl.runs.foreign.table import Table, read_table, table_of
+from gcode2krl.runs.foreign.table import LogTable, read_table, table_of
 from gcode2krl.runs.head import Clocks, Layout, RunHead, read_head
 from gcode2krl.runs.krc_trace import read_krc_trace
 from gcode2krl.runs.rsi_log import is_telegrams, read_rsi_log
@@ -50,7 +50,7 @@ def guess_of(source: Any, *, like: Layout | None = None, **answers: Any) -> Gues
     """
     if isinstance(source, (str, Path)):
         source = read_table(source)
-    table = source if isinstance(source, Table) else table_of(source)
+    table = source if isinstance(source, LogTable) else table_of(source)
     stated = any(answers.get(key) for key in ("columns", "units", "order", "joints"))
     if like is not None and same_columns(like, table) and not stated:
         return by_layout(table, like, answers.get("prediction"))
@@ -262,7 +262,7 @@ def _written(head: dict[str, Any], sheets: Mapping[str, Sheet], folder: Path) ->
     return [folder / "run.toml", *written]
 
 
-def earlier_layout(folder: Path, table: Table) -> tuple[Layout, Path] | None:
+def earlier_layout(folder: Path, table: LogTable) -> tuple[Layout, Path] | None:
     """Return the layout of a run beside a folder whose columns are those of a table, and that run."""
     for head, place in _heads_beside(folder):
         if same_columns(head.layout, table):

@@ -108,7 +108,7 @@ _OTHER_FORMATS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class LogTable:
     """The columns of one file by their own names, and how they were read."""
 
     source: str
@@ -129,7 +129,7 @@ class Table:
         return (*self.columns, *self.words)
 
 
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path) -> LogTable:
     """Read CSV of any separator and decimal sign, Excel, Parquet or MATLAB v5.
 
     Raises `NotUnderstoodError`: unreadable, no table, another format, a value that is not a number.
@@ -158,7 +158,7 @@ def read_table(path: str | Path) -> Table:
     return _of_text(_decoded(data), file)
 
 
-def table_of(frame: Any, source: str = "table", how: str = "a frame", first_row: int = 1) -> Table:
+def table_of(frame: Any, source: str = "table", how: str = "a frame", first_row: int = 1) -> LogTable:
     """Return the table of a frame: polars, pandas, Arrow, a mapping, or a structured array.
 
     Raises `NotUnderstoodError` for anything else.
@@ -201,7 +201,7 @@ class _Shape(NamedTuple):
     decimal_comma: bool
 
 
-def _of_text(text: str, file: Path) -> Table:
+def _of_text(text: str, file: Path) -> LogTable:
     import polars as pl
 
     if "\0" in text[:100_000]:
@@ -293,7 +293,9 @@ def _shape(lines: list[str], separator: str, file: Path) -> _Shape | None:
     return _Shape(score, separator, names, units, first, commas and (separator != "," or not points))
 
 
-def _numeric(frame: "pl.DataFrame", source: str, how: str, first_row: int, units: Mapping[str, str]) -> Table:
+def _numeric(
+    frame: "pl.DataFrame", source: str, how: str, first_row: int, units: Mapping[str, str]
+) -> LogTable:
     """Return the columns that are numbers or stamps, the others by name."""
     import polars as pl
 
@@ -321,7 +323,7 @@ def _numeric(frame: "pl.DataFrame", source: str, how: str, first_row: int, units
                 words.append(name)
                 continue
         columns[printable(name)] = numbers(series, name, first_row, Path(source))
-    return Table(source, columns, stated, tuple(words), first_row, how, started)
+    return LogTable(source, columns, stated, tuple(words), first_row, how, started)
 
 
 def _stamps(text: "pl.Series") -> "pl.Series | None":
@@ -345,7 +347,7 @@ def _seconds(stamps: "pl.Series") -> Floats:
     return np.asarray(passed.cast(pl.Float64).fill_null(float("nan")).to_numpy() * 1e-6, dtype=np.float64)
 
 
-def _of_excel(file: Path) -> Table:
+def _of_excel(file: Path) -> LogTable:
     """Return the first sheet that is a table; the last one's error where none is."""
     refused: NotUnderstoodError | None = None
     sheets = lines_of_sheets(file)
@@ -371,7 +373,7 @@ def _leaves(variables: Mapping[str, Any], parent: str = "") -> Iterator[tuple[st
             yield called, value
 
 
-def _of_matlab(file: Path) -> Table:
+def _of_matlab(file: Path) -> LogTable:
     """Return the vectors and matrices of a MATLAB v5 file that have as many rows as most of them."""
     import polars as pl
     import scipy.io
