@@ -38,7 +38,7 @@ _coupling_index = core_function("compliance_coupling_index", FLOATS, FLOATS, FLO
 
 
 def tip_flexibility(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
-    """Return the displacement (n, 3, 3) in mm of the tip by a small force of 1 N, along the axes of ``$BASE``.
+    """Return the displacement (n, 3, 3) in mm of the tip by small forces, per N, along ``$BASE``.
 
     ``q_rad`` (n, 6). Raises `NotUnderstoodError` where the cell does not state the stiffness.
     """

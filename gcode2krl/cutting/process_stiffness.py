@@ -59,7 +59,7 @@ def process_stiffness(
     diameter_mm: float,
     law: Floats,
 ) -> Floats:
-    """Return dF/du (n, 3, 3) in N/mm: column j is the change of the mean force by a displacement along axis j.
+    """Return dF/du (n, 3, 3) in N/mm: column j is the change of the mean force by a displacement along j.
 
     ``phi_rad`` (n, 2k) as in `mean_force`, NaN pairs are none; ``force_N`` (n, 3) on the tool and
     ``direction`` (n, 3) of its motion along the same axes, in which ``rotation`` (n, 4) are the quaternions

@@ -78,12 +78,10 @@ def coupling_along(
     rows = rows[distinct(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
     pose, tool = q_rad[rows], forces.tool[rows]
     process = stiffness_of_cut(rows, forces, motion, toolpath, cell)
-    turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)
-    over = (
-        _turned(rows_at(motion, rows), pose, tool, process, cell, turns)
-        if spins
-        else np.zeros((0, len(rows)))
-    )
+    turns, over = np.zeros(0), np.zeros((0, len(rows)))
+    if spins:
+        turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD)
+        over = _turned(rows_at(motion, rows), pose, tool, process, cell, turns)
     index = coupling_index(tip_flexibility(pose, cell, tool), process, most_gain=most_gain)
     return Coupling(rows, index, turns, over)
 

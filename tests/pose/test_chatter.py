@@ -134,11 +134,12 @@ def test_the_process_turns_with_the_tool():
     turn = generator.normal(size=4)
     rotation = rotation_from_quaternion(turn / np.linalg.norm(turn))
     feed, force = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0), np.array([20.0, -30.0, 40.0])
+    dives = feed - np.array([0.0, 0.0, 0.7])
     normal, arcs = np.array([-1.0, 1.0, 0.0]) / np.sqrt(2.0), np.array([[0.0, 1.1, np.nan, np.nan]])
     one, law = (np.array([4.0]), np.array([0.1])), law_array(load_cell().material)
 
     def found(axes, quaternion):
-        way = (axes @ force)[None], (axes @ (feed + [0.0, 0.0, 0.7]))[None], quaternion[None]
+        way = (axes @ force)[None], (axes @ dives)[None], quaternion[None]
         return process_stiffness(arcs, *one, *way, 3, 16.0, law)[0]
 
     upright = found(np.eye(3), np.array([0.0, 0.0, 0.0, 1.0]))
