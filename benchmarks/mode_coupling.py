@@ -14,11 +14,12 @@ import numpy as np
 from gcode2krl.compliance.mode_coupling import coupling_index
 from gcode2krl.cutting import mean_force
 from gcode2krl.cutting.law import linear_edge_law
-from gcode2krl.cutting.process_stiffness import side_slope
+from gcode2krl.cutting.process_stiffness import process_stiffness
 
 CASES, SEED = 200, 46
 STEP_S, LONG_S = 2e-3, 6.0
 START_MM = 1e-4
+ALONG_X, UPRIGHT = np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0, 1.0]])
 RIGID = 50.0
 """Stiffness of the third direction, in stiffnesses of the modes."""
 
@@ -72,15 +73,12 @@ def index_of(cases):
         arc = np.arccos(1.0 - 2.0 * a_e / diameter)
         phi = np.array([[0.0, arc] if is_up else [np.pi - arc, np.pi]])
         force = mean_force(phi, a_p, f_z, int(teeth), diameter, 0.0, six)[0]
-        slope = side_slope(phi, np.array([a_p]), np.array([f_z]), int(teeth), diameter, linear_edge_law(six))[
-            0
-        ]
-        process = np.zeros((3, 3))
-        process[:, 1], process[:, 2] = slope, -force / a_p
-        process[2] *= -1.0  # axial forces count from the holder to the tip
+        force[2] *= -1.0  # axial forces count from the holder to the tip
+        cut = phi, np.array([a_p]), np.array([f_z]), force[None], ALONG_X, UPRIGHT
+        process = process_stiffness(*cut, int(teeth), diameter, linear_edge_law(six))
         third = np.cross(modes[:, 0], modes[:, 1])
         stiffness = modes @ np.diag(k) @ modes.T + RIGID * k.max() * np.outer(third, third)
-        index.append(coupling_index(stiffness[None], process[None])[0])
+        index.append(coupling_index(np.linalg.inv(stiffness)[None], process)[0])
     return np.array(index)
 
 

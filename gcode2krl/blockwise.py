@@ -80,7 +80,7 @@ def plan_course(
     ``watches`` are there collisions among the findings.
     """
     chain = krc4.build_chain(targets, cell)
-    profile = krc4.plan(chain, cell)
+    profile = krc4.plan(chain, cell, both_laws=True)
     simplify_mm = targets.simplified.tolerance_mm if targets.simplified is not None else None
     free = krc4.plan(chain, cell, look_ahead=False)
     findings: list[Callable[[], tuple[Issue, ...]]] = [

@@ -26,6 +26,12 @@ NO_SPEED, NO_VELOCITY = np.zeros((0, 6)), np.zeros((0, 3))
 _displaced = core_function(
     "compliance_displaced", *(FLOATS,) * 7, INTS32, OUT_FLOATS, OUT_FLOATS, FLOATS, OUT_FLOATS
 )
+flexibility_rows = core_function("compliance_flexibility", *(FLOATS,) * 5, INTS32, OUT_FLOATS)
+"""Write the flexibility (n, 9) in mm/N of the tip against small forces, along ``base``.
+
+Takes ``q_rad``, ``frames``, ``softness``, ``base``, ``tips_mm`` and ``tool`` as `displaced_rows` does, and
+the result.
+"""
 _tip = core_function("compliance_tip", *(FLOATS,) * 5, INTS32, OUT_FLOATS, OUT_FLOATS)
 
 

@@ -25,54 +25,46 @@ import numpy.typing as npt
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.core import FLOAT, FLOATS, OUT_FLOATS, core_function
-from gcode2krl.compliance.deflection import displace
+from gcode2krl.compiled.inputs import contiguous
+from gcode2krl.compliance import chain, model
 
 DAMPING = 0.02
 """Damping ratio of the arm's modes, an assumption: tap tests of milling robots find 0.01 to 0.05."""
 MOST_GAIN = 16.0
 """Gain up to which an instability is looked for: an index below 1/16 is told as 0."""
-_LOAD_N = 1.0
 _LEAST_MM_N = 1e-12
 """Flexibility of a rigid arm, so that it has a stiffness."""
-_coupling_index = core_function("compliance_coupling_index", FLOATS, FLOATS, FLOATS, FLOAT, OUT_FLOATS)
+_coupling_index = core_function("compliance_coupling_index", FLOATS, FLOATS, FLOAT, FLOAT, OUT_FLOATS)
 
 
-def tip_stiffness(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
-    """Return the stiffness (n, 3, 3) in N/mm of the tip against forces, along the axes of ``$BASE``.
+def tip_flexibility(q_rad: Floats, cell: Cell, tool: npt.ArrayLike | None = None) -> Floats:
+    """Return the displacement (n, 3, 3) in mm of the tip by small forces, per N, along ``$BASE``.
 
     ``q_rad`` (n, 6). Raises `NotUnderstoodError` where the cell does not state the stiffness.
     """
-    root_from_base = cell.base_matrix()[:3, :3]
-    bent = [
-        displace(q_rad, _LOAD_N * root_from_base[:, axis], np.zeros(3), cell, tool)[0] @ root_from_base
-        for axis in range(3)
-    ]
-    flexibility = np.stack(bent, axis=2) / _LOAD_N + _LEAST_MM_N * np.eye(3)
-    return np.asarray(np.linalg.inv((flexibility + flexibility.transpose(0, 2, 1)) / 2.0))
+    flexibility, base = np.empty((len(q_rad), 9)), contiguous(cell.base_matrix()[:3, :3])
+    arm = (model.frames(cell), model.softness(cell), base)
+    chain.flexibility_rows(contiguous(q_rad), *arm, *model.tips(cell, tool, len(q_rad)), flexibility)
+    flexibility[:, ::4] += _LEAST_MM_N
+    return flexibility.reshape(-1, 3, 3)
 
 
 def coupling_index(
-    stiffness_N_mm: Floats, process_N_mm: Floats, damping: float = DAMPING, most_gain: float = MOST_GAIN
+    flexibility_mm_N: Floats, process_N_mm: Floats, damping: float = DAMPING, most_gain: float = MOST_GAIN
 ) -> Floats:
     """Return the index (n,) of mode coupling: 1/g of the least gain g > 0 at which the tip swings by itself.
 
     From 1 on the cut is unstable as predicted; at 0.5 it would be at twice the force. Frequency and mass drop
-    out. NaN where the stiffness is not finite.
+    out. NaN where the flexibility is not finite.
 
     Parameters
     ----------
-    stiffness_N_mm : (n, 3, 3) of the tip, symmetric and positive.
+    flexibility_mm_N : (n, 3, 3) of the tip, the inverse of its stiffness K: symmetric and positive.
     process_N_mm : (n, 3, 3) change of the mean force on the tool by a displacement of its tip.
     damping : ratio, that of each mode, above 0.
     most_gain : up to which an instability is looked for; an index below its inverse is 0.
     """
-    finite = np.asarray(np.isfinite(stiffness_N_mm + process_N_mm).all(axis=(1, 2)))
-    scale = np.where(finite, np.trace(stiffness_N_mm, axis1=1, axis2=2) / 3.0, 1.0)[:, None, None]
-    stiffness = np.where(finite[:, None, None], stiffness_N_mm / scale, np.eye(3))
-    process = np.where(finite[:, None, None], process_N_mm / scale, 0.0)
-    values, modes = np.linalg.eigh(stiffness)
-    drag = 2.0 * damping * (modes * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ modes.transpose(0, 2, 1)
-    index = np.empty(len(scale))
-    flat = (np.ascontiguousarray(matrices.reshape(-1, 9)) for matrices in (drag, stiffness, process))
-    _coupling_index(*flat, float(most_gain), index)
-    return np.where(finite, index, np.nan)
+    index = np.empty(len(process_N_mm))
+    flat = (contiguous(matrices).reshape(-1, 9) for matrices in (flexibility_mm_N, process_N_mm))
+    _coupling_index(*flat, damping, most_gain, index)
+    return index

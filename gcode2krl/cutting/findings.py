@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gcode2krl.arrays import Bools, Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.cell.sections import Material, Tool
-from gcode2krl.compiled.chunks import chunked
-from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip, spindle_power
+from gcode2krl.compiled.core import BOOLS, FLOATS, INTS32, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, spindle_power
 from gcode2krl.cutting.records import followed, taken
 from gcode2krl.errors import MOST_PLACES, Issue, Severity
 from gcode2krl.tables import Forces, lengths
@@ -26,6 +26,11 @@ _GRAZE_MM = 3.0
 rounded corner has left."""
 _THIN_MM = 0.3
 """Thicker material is never ignored as the rest of a rounded corner."""
+
+
+_count_chips = core_function(
+    "cutting_count_chips", BOOLS, *(FLOATS,) * 4, INTS32, FLOATS, OUT_FLOATS, OUT_INTS, OUT_INTS
+)
 
 
 class Stretch(NamedTuple):
@@ -377,51 +382,25 @@ class _Chips:
 
     def __init__(self, cycle_s: float, material: Material | None) -> None:
         self._cycle_s = cycle_s
-        self._between = (
-            (material.measured_f_z_mm, material.measured_a_p_mm) if material is not None else (None, None)
-        )
-        self._in_cut = 0
-        self._count, self._line = [0, 0, 0], [0, 0, 0]
-        """Of thin chips, thick ones and cuts that were not measured: how many, and the line of the first."""
-        self._beyond: dict[str, tuple[float, float]] = {}
+        self._measured = np.tile([-np.inf, np.inf], (2, 1))
+        self._beyond = np.tile([np.inf, 0.0], (2, 1))
+        """(2, 2) the range of f_z and a_p that was measured, and that of values outside it."""
+        if material is not None:
+            for row, between in enumerate((material.measured_f_z_mm, material.measured_a_p_mm)):
+                if between is not None:
+                    self._measured[row] = between[0] * (1.0 - _BESIDE), between[1] * (1.0 + _BESIDE)
+        self._counts, self._line = np.zeros(4, dtype=np.int64), np.zeros(3, dtype=np.int64)
+        """Of thin chips, thick ones and cuts that were not measured: how many, and the line of the first;
+        behind them how many cuts in all."""
 
     def take(self, cut: Cut, forces: Forces) -> None:
-        cutting = cut.engaged & (cut.f_z_mm > 0.0)
-        self._in_cut += int(np.count_nonzero(cutting))
-
-        def chips(rows: slice) -> Floats:
-            return largest_chip(forces.phi_rad[rows], cut.f_z_mm[rows], cut.ramp_rad[rows])
-
-        chip_mm = chunked(chips, len(cutting))
-        outside = self._outside(cut, forces, cutting)
-        for kind, wrong in enumerate((chip_mm < THIN_CHIP_MM, chip_mm > THICK_CHIP_MM, outside)):
-            wrong &= cutting
-            count = int(np.count_nonzero(wrong))
-            if count and not self._count[kind]:
-                self._line[kind] = int(cut.source_line[np.argmax(wrong)])
-            self._count[kind] += count
-
-    def _outside(self, cut: Cut, forces: Forces, cutting: Bools) -> Bools:
-        """Return (m,) True where feed per tooth or depth are not between those that were measured."""
-        outside = np.zeros(len(cutting), dtype=np.bool_)
-        for name, between, values in zip(
-            ("f_z", "a_p"), self._between, (cut.f_z_mm, forces.a_p_mm), strict=True
-        ):
-            if between is None:
-                continue
-            low, high = between[0] * (1.0 - _BESIDE), between[1] * (1.0 + _BESIDE)
-            beyond = cutting & ((values < low) | (values > high))
-            if beyond.any():
-                least, most = self._beyond.get(name, (np.inf, 0.0))
-                self._beyond[name] = (
-                    min(least, float(values[beyond].min())),
-                    max(most, float(values[beyond].max())),
-                )
-            outside |= beyond
-        return outside
+        samples = (cut.engaged, forces.phi_rad, cut.f_z_mm, cut.ramp_rad, forces.a_p_mm, cut.source_line)
+        columns = map(np.ascontiguousarray, samples)
+        _count_chips(*columns, self._measured, self._beyond, self._counts, self._line)
 
     def issues(self) -> Iterator[Issue]:
-        beyond = ", ".join(f"{name} {low:.3f}..{high:.3f} mm" for name, (low, high) in self._beyond.items())
+        ranges = zip(("f_z", "a_p"), self._beyond.tolist(), strict=True)
+        beyond = ", ".join(f"{name} {low:.3f}..{high:.3f} mm" for name, (low, high) in ranges if low <= high)
         change = "change F or the spindle speed"
         kinds: tuple[tuple[Severity, str, str, str], ...] = (
             ("note", "chip-thin", f"chips below {THIN_CHIP_MM:g} mm: edges rub more than cut", change),
@@ -433,10 +412,12 @@ class _Chips:
                 "measure such a cut too (`gcode2krl identify force`), or change F and the depth",
             ),
         )
-        for count, line, (severity, code, words, remedy) in zip(self._count, self._line, kinds, strict=True):
-            if count * self._cycle_s < max(_SHORT_S, 0.05 * self._in_cut * self._cycle_s):
+        *counts, in_cut = self._counts.tolist()
+        lines = self._line.tolist()
+        for count, line, (severity, code, words, remedy) in zip(counts, lines, kinds, strict=True):
+            if count * self._cycle_s < max(_SHORT_S, 0.05 * in_cut * self._cycle_s):
                 continue
-            share = count / self._in_cut
+            share = count / in_cut
             sentence = f"{words}, in {share:.0%} of the time in cut, first at this line"
             yield Issue(severity, code, line, sentence, remedy)
 

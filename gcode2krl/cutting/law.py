@@ -5,7 +5,6 @@ from numpy.typing import ArrayLike
 
 from gcode2krl.arrays import Floats
 from gcode2krl.cell.sections import Material
-from gcode2krl.cutting.slices import largest_chips
 from gcode2krl.errors import input_error
 from gcode2krl.units import MM_PER_M, RAD_PER_REV
 
@@ -64,22 +63,6 @@ def feed_per_tooth(speed_mm_s: ArrayLike, spindle_rad_s: ArrayLike, teeth: int) 
     turning = omega > 0.0
     per_tooth = RAD_PER_REV * speed / (teeth * np.where(turning, omega, 1.0))
     return np.asarray(np.where(turning, per_tooth, 0.0))
-
-
-def largest_chip(phi_rad: ArrayLike, f_z_mm: ArrayLike, ramp_rad: ArrayLike = 0.0) -> Floats:
-    """Return the largest chip thickness (n,) in mm on a cylinder's edge and on the bottom over the arcs.
-
-    ``phi_rad`` (n, 2k), NaN pairs are none; 0 without an arc. To compare with `THIN_CHIP_MM`,
-    `THICK_CHIP_MM`.
-    """
-    arcs = np.ascontiguousarray(np.atleast_2d(np.asarray(phi_rad, dtype=float)))
-    out = np.empty(len(arcs))
-    feed, gamma = (
-        np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=float), out.shape))
-        for values in (f_z_mm, ramp_rad)
-    )
-    largest_chips(arcs, feed, gamma, out)
-    return out
 
 
 def spindle_power(torque_Nmm: ArrayLike, spindle_rad_s: ArrayLike) -> Floats:

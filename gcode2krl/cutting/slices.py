@@ -23,9 +23,6 @@ Takes ``phi_rad`` (n, 2k) arcs, NaN pairs are none; ``a_p_mm``, ``f_z_mm``, ``ra
 teeth; a `cutter.Shape`; the law (8,); ``out``.
 """
 
-largest_chips = core_function("cutting_largest_chips", FLOATS, FLOATS, FLOATS, OUT_FLOATS)
-"""Write the largest chip thickness in mm, ``out`` (n,), from arcs (n, 2k), feed per tooth, descent (n,)."""
-
 peak_rows = core_function("cutting_peak_rows", *(FLOATS,) * 4, INT, FLOAT, SHAPE, FLOATS, OUT_FLOATS)
 """Write the largest force in N, ``out`` (n,), on all teeth together over a revolution, helix included.
 

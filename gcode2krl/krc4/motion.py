@@ -183,6 +183,7 @@ def plan(
     *,
     look_ahead: bool = True,
     pieces: bool = True,
+    both_laws: bool = False,
     speed_mm_s: Floats | None = None,
 ) -> Profile:
     """Return the profile of a chain; ``look_ahead`` False leaves the model of ``$ADVANCE`` out.
@@ -202,6 +203,7 @@ def plan(
         in_view,
         controller.law == "averages",
         pieces=pieces,
+        both_laws=both_laws,
     )
 
 
@@ -210,8 +212,8 @@ def motion_issues(
 ) -> tuple[Issue, ...]:
     """Return findings on lost time: look-ahead on short moves, stops, and the difference of the two laws.
 
-    ``free`` is the profile without the model of ``$ADVANCE``; ``simplify_mm`` the tolerance within which
-    moves have been merged already. Notes; together above ``[limits] lost_time_share`` warnings.
+    ``profile`` is by both laws, ``free`` without the model of ``$ADVANCE``; ``simplify_mm`` the tolerance in
+    which moves have been merged already. Notes; together above ``[limits] lost_time_share`` warnings.
     """
     issues: list[Issue] = []
     lost_whole_s = 0.0
@@ -235,9 +237,7 @@ def motion_issues(
     if "controller.law" in cell.defaults:  # who states it has identified it, or answers for it
         law = cell.controller.law
         other_law = "trapezoid" if law == "averages" else "averages"
-        other_controller = cell.controller.model_copy(update={"law": other_law})
-        by_other = cell.model_copy(update={"controller": other_controller})
-        other_s = plan(chain, by_other, pieces=False).total_s
+        other_s = profile.by_other_law_s
         if abs(other_s - profile.total_s) > 0.05 * profile.total_s:
             sentence = f"time by law {law} {profile.total_s:.1f} s, by {other_law} {other_s:.1f} s"
             remedy = "`gcode2krl identify controller` writes the law of a trace into the cell"

@@ -6,6 +6,7 @@ of the controller model differ only where a move is too short to reach its speed
 up and down overlap (their sum), ``trapezoid`` accelerates with a until it must brake.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,8 @@ class Profile(NamedTuple):
     move_end_s: Floats
     """(n,) time at which each move ends, before the last average."""
     total_s: float
+    by_other_law_s: float = math.nan
+    """How long it would last by the other law, where both were asked for."""
 
 
 def plan_profile(
@@ -57,6 +60,7 @@ def plan_profile(
     averages: bool,
     *,
     pieces: bool = True,
+    both_laws: bool = False,
 ) -> Profile:
     """Plan a chain of n moves that starts and ends at rest.
 
@@ -70,6 +74,7 @@ def plan_profile(
     moves_in_view : ``$ADVANCE``, or `UNLIMITED`.
     averages : the law; False = trapezoid.
     pieces : False where only ``total_s`` is wanted: the columns are empty.
+    both_laws : True where ``by_other_law_s`` is wanted, too.
     """
     if len(length_mm) == 0:
         standstill = np.zeros(1)
@@ -87,15 +92,16 @@ def plan_profile(
     run_acceleration = acceleration[first]
     _reachable(length - head - tail, vertex, run_acceleration)
     table, total_s = np.empty((5, 6 * len(length) + 2 if pieces else 0)), np.empty(1)
-    used = _pieces(
-        *(length, top, run_stop, wait_s[last], vertex, head, tail, run_acceleration, k_s, averages),
-        *(table, total_s),
-    )
+    runs = length, top, run_stop, wait_s[last], vertex, head, tail, run_acceleration, k_s
+    by_other_s = np.full(1, np.nan)
+    if both_laws:
+        _pieces(*runs, not averages, np.empty((5, 0)), by_other_s)
+    used = _pieces(*runs, averages, table, total_s)
     t, s, v, a, i = (column[:used] for column in table)
     move_end = np.empty(len(length_mm) if pieces else 0)
     if pieces:
         _move_ends(np.cumsum(length_mm), t, s, v, a, move_end)
-    return Profile(t, s, v, a, i, move_end, float(total_s[0]))
+    return Profile(t, s, v, a, i, move_end, float(total_s[0]), float(by_other_s[0]))
 
 
 def _run_ends(speed_mm_s: Floats, a_mm_s2: Floats, bound_mm_s: Floats) -> Ints:

@@ -16,11 +16,11 @@ from gcode2krl.arrays import Floats, Ints, Ints32
 from gcode2krl.cell import Cell
 from gcode2krl.compiled.inputs import distinct
 from gcode2krl.compliance import missing_stiffness, stiffness
-from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_stiffness
+from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_flexibility
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import law_array
 from gcode2krl.cutting.lobes import depth_limit
-from gcode2krl.cutting.process_stiffness import across, side_slope, stiffness_of_cut
+from gcode2krl.cutting.process_stiffness import process_stiffness, stiffness_of_cut
 from gcode2krl.errors import Issue
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.pose.quality import Poses
@@ -33,6 +33,9 @@ _DEEPEST = 6
 _GRID_RAD = 5.0 * RAD_PER_DEG
 _USUAL_CHIP_MM = 0.1
 _UP_HALF = np.array([[0.0, math.pi / 2.0]])
+_ALONG_X, _UPRIGHT = np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0, 1.0]])
+_TO_HOLDER = np.array([1.0, 1.0, -1.0])
+"""Axial forces count from the holder to the tip."""
 
 
 class Coupling(NamedTuple):
@@ -73,11 +76,13 @@ def coupling_along(
     cuts = np.isfinite(forces.phi_rad[:, 0]) & (forces.a_p_mm > 0.0) & np.isfinite(q_rad[:, 0])
     rows = np.flatnonzero(cuts)
     rows = rows[distinct(np.linspace(0, len(rows) - 1, min(JUDGED, len(rows))).astype(np.int64))]
-    cut, moved, pose = rows_at(forces, rows), rows_at(motion, rows), q_rad[rows]
-    process = stiffness_of_cut(cut, moved, toolpath, cell)
-    turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD) if spins else np.zeros(0)
-    over = _turned(moved, pose, cut.tool, process, cell, turns)
-    index = coupling_index(tip_stiffness(pose, cell, cut.tool), process, most_gain=most_gain)
+    pose, tool = q_rad[rows], forces.tool[rows]
+    process = stiffness_of_cut(rows, forces, motion, toolpath, cell)
+    turns, over = np.zeros(0), np.zeros((0, len(rows)))
+    if spins:
+        turns = np.arange(-np.pi, np.pi - 1e-9, _GRID_RAD)
+        over = _turned(rows_at(motion, rows), pose, tool, process, cell, turns)
+    index = coupling_index(tip_flexibility(pose, cell, tool), process, most_gain=most_gain)
     return Coupling(rows, index, turns, over)
 
 
@@ -105,8 +110,6 @@ def _turned(
     """Return the index (s, n) with the tool turned about its axis, in the branch nearest to ``q_rad``."""
     row = np.tile(np.arange(len(q_rad)), len(turns_rad))
     index = np.full(len(row), np.nan)
-    if not len(row):
-        return index.reshape(len(turns_rad), len(q_rad))
     half = np.repeat(turns_rad / 2.0, len(q_rad))
     x, y, z, w = motion.rotation[row].T
     s, c = np.sin(half), np.cos(half)
@@ -119,7 +122,7 @@ def _turned(
     reached[reached] = robot.pose_margins(chosen[reached], cell)[0] >= 0.0
     if reached.any():
         at = row[reached]
-        index[reached] = coupling_index(tip_stiffness(chosen[reached], cell, tool[at]), process[at])
+        index[reached] = coupling_index(tip_flexibility(chosen[reached], cell, tool[at]), process[at])
     return index.reshape(len(turns_rad), len(q_rad))
 
 
@@ -133,20 +136,25 @@ def usual_coupling(poses: Poses, direction: Floats, cell: Cell) -> Floats:
     assert material is not None
     law, index = law_array(material), np.full((len(direction), 8), np.nan)
     axis = rotation_from_quaternion(np.ascontiguousarray(poses.rotation))[:, :, 2]
-    feed = across(direction, axis)
+    feed = _across(direction, axis)
     for number in np.unique(poses.tool).tolist():
         rows, tool = np.flatnonzero(poses.tool == number), cell.tool[number]
         depth, chip = np.array([tool.diameter_mm / 2.0]), np.array([_USUAL_CHIP_MM])
-        force = cutting_load(tool, law, _UP_HALF, depth, chip, peak=False).force_N[0]
-        slope = side_slope(_UP_HALF, depth, chip, tool.teeth, tool.diameter_mm, law)[0]
-        normal = np.cross(axis[rows], feed[rows])
-        way = np.stack([feed[rows], normal, -axis[rows]], axis=2)
-        sideways, deeper = way @ slope, way @ (-force / depth[0])
-        process = sideways[:, :, None] * normal[:, None, :] + deeper[:, :, None] * axis[rows][:, None, :]
+        force = cutting_load(tool, law, _UP_HALF, depth, chip, peak=False).force_N * _TO_HOLDER
+        cut = (_UP_HALF, depth, chip, force, _ALONG_X, _UPRIGHT, tool.teeth, tool.diameter_mm, law)
+        way = np.stack([feed[rows], np.cross(axis[rows], feed[rows]), axis[rows]], axis=2)
+        process = way @ process_stiffness(*cut) @ way.transpose(0, 2, 1)
         q_rad = robot.inverse(poses.position_mm[rows], poses.rotation[rows], cell, number).reshape(-1, 6)
-        coupling = coupling_index(tip_stiffness(q_rad, cell, number), np.repeat(process, 8, axis=0))
+        coupling = coupling_index(tip_flexibility(q_rad, cell, number), np.repeat(process, 8, axis=0))
         index[rows] = coupling.reshape(-1, 8)
     return index
+
+
+def _across(direction: Floats, axis: Floats) -> Floats:
+    """Return the unit direction (n, 3) of a motion across unit axes (n, 3), zero where it is along them."""
+    part = direction - axis * np.einsum("ij,ij->i", direction, axis)[:, None]
+    size = np.linalg.norm(part, axis=1, keepdims=True)
+    return np.asarray(np.divide(part, size, out=np.zeros_like(part), where=size > 1e-9))
 
 
 class ChatterWatch:

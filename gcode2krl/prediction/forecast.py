@@ -8,6 +8,7 @@ import numpy as np
 from gcode2krl.arrays import Floats
 from gcode2krl.cell import Cell
 from gcode2krl.errors import Issue
+from gcode2krl.prediction.limits import longest
 from gcode2krl.tables import Deflection, Forces, PilotForce, Targets, Toolpath
 
 
@@ -55,13 +56,12 @@ class LargestLoads:
         """Add the next samples, of which the joints are ``q_rad`` (m, 6)."""
         bent, across = 0.0, 0.0
         if deflection is not None:
-            bent, across = largest(deflection.deflection_base_mm), largest(deflection.correction_base_mm)
+            row, bent, _ = longest(deflection.deflection_base_mm)
+            across = longest(deflection.correction_base_mm).length
             if q_rad is not None and bent > self._most[4]:
-                size = np.einsum("ij,ij->i", deflection.deflection_base_mm, deflection.deflection_base_mm)
-                row = int(np.nanargmax(size))
                 load = forces.force_base_N[row].copy(), forces.moment_base_Nmm[row].copy()
                 self._worst = Bend(q_rad[row].copy(), *load, int(forces.tool[row]))
-        most = [largest(forces.force_base_N)]
+        most = [longest(forces.force_base_N).length]
         most += [
             float(column.max(initial=0.0)) for column in (forces.torque_Nmm, forces.a_p_mm, forces.a_e_mm)
         ]
@@ -93,12 +93,6 @@ def load_figures(forces: Forces, deflection: Deflection | None, q_rad: Floats | 
     loads = LargestLoads()
     loads.take(forces, deflection, q_rad)
     return loads.figures(with_deflection=deflection is not None)
-
-
-def largest(vectors: Floats) -> float:
-    """Return the largest length of vectors (n, 3); 0 where all are unknown."""
-    size = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-    return float(np.fmax.reduce(size, initial=0.0))
 
 
 @dataclass(frozen=True)

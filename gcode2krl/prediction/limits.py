@@ -16,11 +16,11 @@ import numpy as np
 
 from gcode2krl.arrays import Bools, Floats, Ints32
 from gcode2krl.cell import Cell
-from gcode2krl.compiled.core import FLOATS, INT, OUT_FLOATS, core_function
-from gcode2krl.compiled.inputs import distinct
+from gcode2krl.compiled.core import FLOAT, FLOATS, INT, INTS32, OUT_FLOATS, OUT_INTS, core_function
+from gcode2krl.compiled.inputs import contiguous, distinct
 from gcode2krl.errors import Issue
 from gcode2krl.tables import Deflection, Forces, Motion, lengths
-from gcode2krl.units import GRAVITY_M_S2, MM_PER_M, NMM_PER_NM
+from gcode2krl.units import GRAVITY_M_S2, MM_PER_M
 
 GUESSED_FACTOR = 2.0
 """Factor by which a force may be too large because its stock is guessed (an assumption): up to this many
@@ -31,6 +31,10 @@ ABSURD_DEFLECTION_MM = 100.0
 """The compliance model is linear in small angles: at this size, 2° on a reach of 3 m, it is not valid."""
 
 _find_longest = core_function("prediction_longest", FLOATS, OUT_FLOATS, returns=INT)
+_find_loads = core_function(
+    "prediction_loads", *(FLOATS,) * 4, INTS32, INTS32, FLOATS, FLOAT, OUT_FLOATS, OUT_INTS, returns=INT
+)
+_write_bends = core_function("prediction_bends", FLOATS, INTS32, INT, FLOAT, OUT_FLOATS)
 
 
 def cycle_acceleration(motion: Motion, cycle_s: float) -> Floats:
@@ -56,10 +60,9 @@ def _apart(cycle_s: float, dt_s: float, count: int) -> int:
 
 def _bends(position_mm: Floats, tool: Ints32, n: int, dt_s: float) -> Floats:
     """Return the acceleration (m - 2n,) of all but the first and the last n samples, from those n apart."""
-    bend = position_mm[2 * n :] - 2.0 * position_mm[n:-n] + position_mm[: -2 * n]
-    result = np.sqrt(np.einsum("ij,ij->i", bend, bend)) / (n * dt_s) ** 2
-    result[tool[2 * n :] != tool[: -2 * n]] = 0.0
-    return np.asarray(result)
+    bends = np.empty(len(tool) - 2 * n)
+    _write_bends(contiguous(position_mm), np.ascontiguousarray(tool), n, n * dt_s, bends)
+    return bends
 
 
 class AccelerationLimit:
@@ -69,8 +72,9 @@ class AccelerationLimit:
         """Take the limit of the cell, the time between samples and how many there are in all."""
         self._most = cell.limits.acceleration_mm_s2
         self._dt_s, self._apart = dt_s, _apart(cell.controller.cycle_s, dt_s, count) if count > 2 else 0
-        self._position, self._tool = np.zeros((0, 3)), np.zeros(0, dtype=np.int32)
-        self._line = np.zeros(0, dtype=np.int32)
+        none = np.zeros(0, dtype=np.int32)
+        self._before = np.zeros((0, 3)), none, none
+        """Position, tool and line of the last samples."""
         self._largest = Largest()
 
     def take(self, motion: Motion, line: Ints32) -> None:
@@ -78,13 +82,13 @@ class AccelerationLimit:
         n = self._apart
         if not n:
             return
-        position = np.concatenate([self._position, motion.position_mm])
-        tool, lines = np.concatenate([self._tool, motion.tool]), np.concatenate([self._line, line])
-        if len(position) > 2 * n:
-            self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])
-        self._position, self._tool, self._line = (
-            column[-2 * n :].copy() for column in (position, tool, lines)
-        )
+        block = motion.position_mm, motion.tool, line
+        seam = [np.concatenate([a, b[: 2 * n]]) for a, b in zip(self._before, block, strict=True)]
+        for position, tool, lines in (seam, block):
+            if len(tool) > 2 * n:
+                self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])
+        last = block if len(line) >= 2 * n else seam
+        self._before = last[0][-2 * n :].copy(), last[1][-2 * n :].copy(), last[2][-2 * n :].copy()
 
     def issues(self) -> Iterator[Issue]:
         """Yield a warning where no robot follows."""
@@ -115,30 +119,27 @@ class ForceLimits:
         """Judge the next samples; ``line`` (m,) is the G-code line of each."""
         if self.absurd is not None or not len(forces):
             return
-        with np.errstate(over="ignore", invalid="ignore"):
-            size_N = lengths(forces.force_base_N)
-        self.absurd = _absurd_forces(forces, size_N, line)
-        if self.absurd is None:
-            self.force.take(size_N, line, forces.tool)
-            self.torque.take(forces.torque_Nmm / NMM_PER_NM, line, forces.tool)
-            self._take_load(forces, size_N, line)
+        columns = (forces.force_base_N, forces.moment_base_Nmm, forces.torque_Nmm, forces.peak_N)
+        tool = np.ascontiguousarray(forces.tool)
+        tools = distinct(tool)
+        found, rows = np.empty(5), np.empty(3, dtype=np.int64)
+        weight_N = self._weight_N(tools)
+        wrong = _find_loads(*map(contiguous, columns), tool, tools, weight_N, ABSURD_FORCE_N, found, rows)
+        if wrong >= 0:
+            self.absurd = _absurd_forces(int(tool[wrong]), int(line[wrong]))
+            return
+        *values, cut_N, whole_N = found.tolist()
+        kinds = (self.force, self.torque, self.load)
+        for kind, value, row in zip(kinds, values, rows.tolist(), strict=True):
+            is_new = kind.raise_to(value, int(line[row]), int(tool[row]))
+        if is_new:
+            self._cut_N, self._whole_N = cut_N, whole_N
 
-    def _take_load(self, forces: Forces, cut_N: Floats, line: Ints32) -> None:
-        """Keep the largest load on the flange: the cut, or the cut and the weight."""
-        own_kg = self._own_kg(forces.tool)
+    def _weight_N(self, tools: Ints32) -> Floats:
+        """Return the weight (k, 3) on the flange with each of the tools (k,); 0 where the cell names none."""
+        own_kg = np.array([self._cell.load_of(number).mass_kg or 0.0 for number in tools.tolist()])
         down = -self._cell.base_in_world()[2, :3]  # the world's -z along the axes of $BASE
-        whole_N = lengths(forces.force_base_N + own_kg[:, None] * GRAVITY_M_S2 * down)
-        load_N = np.where(cut_N > 0.0, np.maximum(cut_N, whole_N), 0.0)
-        row = self.load.take(load_N, line, forces.tool)
-        if row is not None:
-            self._cut_N, self._whole_N = float(cut_N[row]), float(whole_N[row])
-
-    def _own_kg(self, tool: Ints32) -> Floats:
-        """Return the mass (m,) on the flange with the tools (m,); 0 where the cell names none."""
-        own_kg = np.empty(len(tool))
-        for number in distinct(tool):
-            own_kg[tool == number] = self._cell.load_of(int(number)).mass_kg or 0.0
-        return own_kg
+        return own_kg[:, None] * GRAVITY_M_S2 * down
 
     def issues(self, is_guessed: bool) -> Iterator[Issue]:
         """Yield what exceeds the limits: one finding, at the largest value, each."""
@@ -193,7 +194,7 @@ class DeflectionLimit:
         if self.absurd is not None or not len(line):
             return
         vectors = (deflection.deflection_base_mm, deflection.correction_base_mm)
-        bent, across = map(_longest, vectors)
+        bent, across = map(longest, vectors)
         if not (bent.is_known and across.is_known and bent.length <= ABSURD_DEFLECTION_MM):
             self.absurd = _absurd_deflection(deflection, reached, line)
         if self.absurd is not None and self._known:  # what nobody stated refuses no program
@@ -235,7 +236,7 @@ class Largest:
         return True
 
 
-class _Longest(NamedTuple):
+class Longest(NamedTuple):
     """The first of the longest vectors; one that is not a number counts as 0."""
 
     row: int
@@ -244,24 +245,18 @@ class _Longest(NamedTuple):
     """Whether all vectors are finite."""
 
 
-def _longest(vectors: Floats) -> _Longest:
+def longest(vectors: Floats) -> Longest:
     """Return the longest of vectors (m, 3)."""
     found = np.empty(2)
     row = _find_longest(np.ascontiguousarray(vectors), found)
-    return _Longest(row, float(found[0]), bool(found[1]))
+    return Longest(row, float(found[0]), bool(found[1]))
 
 
-def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None:
-    """Return the finding on absurd forces, None if there are none."""
-    columns = (forces.force_base_N, forces.moment_base_Nmm, forces.torque_Nmm, forces.peak_N)
-    if all(np.isfinite(column).all() for column in columns) and size_N.max() <= ABSURD_FORCE_N:
-        return None
-    rows = len(forces)
-    finite = np.logical_and.reduce([np.isfinite(column.reshape(rows, -1)).all(axis=1) for column in columns])
-    wrong = int(np.argmax(~finite | ~(size_N <= ABSURD_FORCE_N)))
-    sentence = f"the forces on T{forces.tool[wrong]} are absurd: they are left out"
+def _absurd_forces(tool: int, line: int) -> Issue:
+    """Return the finding on absurd forces."""
+    sentence = f"the forces on T{tool} are absurd: they are left out"
     remedy = "check [material] (N/mm2, N/mm), the tool's diameter_mm and teeth, S and F"
-    return Issue("error", "force-absurd", int(line[wrong]), sentence, remedy)
+    return Issue("error", "force-absurd", line, sentence, remedy)
 
 
 def _absurd_deflection(deflection: Deflection, reached: Bools, line: Ints32) -> Issue | None:

@@ -280,3 +280,74 @@ EXPORT void compliance_tip(Floats q_rad, Floats qd_rad_s, Floats frames, Floats 
         give(state.shift, base, first, rows, velocity_mm_s);
     }
 }
+
+/* The flexibility of the tip, a symmetric matrix: a displacement by a force. */
+typedef struct {
+    Scalar xx, yy, zz, xy, yz, zx;
+} Flexibility;
+
+/* Add that of a virtual joint: minus r x (S·(r x f)), S its softness, to first order in the elastic angles. */
+static void soften(const double *softness, Vector tip, Flexibility *by) {
+    const double c = softness[0], b = softness[1], a = softness[2];
+    for (int j = 0; j < BLOCK; j++) {
+        const double x = tip[0][j], y = tip[1][j], z = tip[2][j];
+        by->xx[j] += b * z * z + a * y * y;
+        by->yy[j] += c * z * z + a * x * x;
+        by->zz[j] += c * y * y + b * x * x;
+        by->xy[j] -= a * x * y;
+        by->yz[j] -= c * y * z;
+        by->zx[j] -= b * x * z;
+    }
+}
+
+/* Turn two of the axes, p and q, of a symmetric matrix from p towards q; r is the third. */
+static void turn_axes(double *restrict pp, double *restrict qq, double *restrict pq, double *restrict pr,
+                      double *restrict qr, const double *restrict cosine, const double *restrict sine) {
+    for (int j = 0; j < BLOCK; j++) {
+        const double c = cosine[j], s = sine[j], mixed = 2.0 * c * s * pq[j], p = pp[j], q = qq[j], to = pr[j];
+        pp[j] = c * c * p - mixed + s * s * q;
+        qq[j] = s * s * p + mixed + c * c * q;
+        pq[j] = c * s * (p - q) + (c * c - s * s) * pq[j];
+        pr[j] = c * to - s * qr[j];
+        qr[j] = s * to + c * qr[j];
+    }
+}
+
+/* Write the flexibility (n, 9) of the tip in mm/N along `base`; arrays as for compliance_displaced. */
+EXPORT void compliance_flexibility(Floats q_rad, Floats frames, Floats softness, Floats base, Floats tips_mm,
+                                   Ints32 tool, Floats flexibility) {
+    Turns turns;
+    Carried state;
+    Scalar cosine, sine;
+    start_turns(&turns);
+    memset(&state, 0, sizeof state);
+    for (int64_t first = 0; first < q_rad.rows; first += BLOCK) {
+        const int64_t rows = least(BLOCK, q_rad.rows - first);
+        Flexibility of;
+        memset(&of, 0, sizeof of);
+        turns_of(q_rad, first, rows, &turns);
+        start(tips_mm, tool, first, rows, &state);
+        for (int i = FRAMES - 1; i >= 0; i--) {
+            const double *frame = &CELL(frames, i, 0);
+            soften(&CELL(softness, i, 0), state.tip, &of);
+            inwards(state.tip, frame, frame[2], frame[3], turns.cos[i], turns.sin[i]);
+            turn_axes(of.xx, of.yy, of.xy, of.zx, of.yz, turns.cos[i], turns.sin[i]);
+            for (int j = 0; j < BLOCK; j++) {
+                cosine[j] = frame[0];
+                sine[j] = frame[1];
+            }
+            turn_axes(of.yy, of.zz, of.yz, of.xy, of.zx, cosine, sine);
+        }
+        for (int64_t j = 0; j < rows; j++) {
+            const double in_root[3][3] = {{of.xx[j], of.xy[j], of.zx[j]},
+                                          {of.xy[j], of.yy[j], of.yz[j]},
+                                          {of.zx[j], of.yz[j], of.zz[j]}};
+            for (int i = 0; i < 9; i++) {
+                double sum = 0.0;
+                for (int k = 0; k < 9; k++)
+                    sum += CELL(base, k / 3, i / 3) * in_root[k / 3][k % 3] * CELL(base, k % 3, i % 3);
+                CELL(flexibility, first + j, i) = sum;
+            }
+        }
+    }
+}

@@ -6,8 +6,10 @@
 
 #include "core.h"
 
-enum { DEGREE = 6, HALVINGS = 7 };
-static const double LEAST_GAIN = 1.0 / 16.0, STEP = 1.4142135623730951;
+#include <string.h>
+
+enum { DEGREE = 6, HALVINGS = 7, MOST_TURNS = 30 };
+static const double LEAST_GAIN = 1.0 / 16.0, STEP = 1.4142135623730951, NO_ENTRY = 1e-17;
 
 typedef double Matrix[3][3];
 
@@ -65,36 +67,98 @@ static bool grows(Matrix drag, Matrix stiffness, Matrix process, double gain) {
     return !dies_out(drag, left);
 }
 
-static void row_of(Floats matrices, int64_t row, Matrix matrix) {
-    for (int i = 0; i < 9; i++)
-        matrix[i / 3][i % 3] = CELL(matrices, row, i);
+/* Turn columns p and q of a matrix. */
+static void turn_columns(Matrix a, int p, int q, double cosine, double sine) {
+    for (int i = 0; i < 3; i++) {
+        const double left = a[i][p], right = a[i][q];
+        a[i][p] = cosine * left - sine * right;
+        a[i][q] = sine * left + cosine * right;
+    }
 }
 
-/* index (n,) gets 1/g of the least gain g, in steps and then by bisection, at which a tip swings by itself; 0 where none up
-   to `most_gain` does. Matrices (n, 9), finite. */
-EXPORT void compliance_coupling_index(Floats drag, Floats stiffness, Floats process, double most_gain,
+/* Make a symmetric matrix diagonal, and write its eigenvectors: Jacobi's turns, each of which makes the entry between two
+   axes 0 (Golub and Van Loan, Matrix Computations, 4th ed. 2013, sec. 8.5). */
+static void diagonalize(Matrix a, Matrix vectors) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            vectors[i][j] = i == j;
+    for (int turn = 0; turn < MOST_TURNS; turn++) {
+        const int p = turn % 3, q = (turn + 1) % 3, r = (turn + 2) % 3;
+        if (fabs(a[p][q]) + fabs(a[q][r]) + fabs(a[r][p]) <= NO_ENTRY * trace(a))
+            return;
+        if (a[p][q] == 0.0)
+            continue;
+        const double tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+        const double tangent = copysign(1.0, tau) / (fabs(tau) + sqrt(1.0 + tau * tau));
+        const double cosine = 1.0 / sqrt(1.0 + tangent * tangent), sine = tangent * cosine;
+        const double pr = a[p][r], qr = a[q][r], more = tangent * a[p][q];
+        a[p][p] -= more;
+        a[q][q] += more;
+        a[p][q] = a[q][p] = 0.0;
+        a[p][r] = a[r][p] = cosine * pr - sine * qr;
+        a[q][r] = a[r][q] = sine * pr + cosine * qr;
+        turn_columns(vectors, p, q, cosine, sine);
+    }
+}
+
+/* Write the stiffness of a flexibility, and the drag of modes of this damping: 2·zeta·sqrt(K) for one mass. */
+static void of_modes(Matrix flexibility, double damping, Matrix stiffness, Matrix drag) {
+    Matrix vectors;
+    diagonalize(flexibility, vectors);
+    memset(stiffness, 0, sizeof(Matrix));
+    memset(drag, 0, sizeof(Matrix));
+    for (int mode = 0; mode < 3; mode++) {
+        const double stiff = 1.0 / flexibility[mode][mode], slows = 2.0 * damping * sqrt(stiff);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) {
+                const double part = vectors[i][mode] * vectors[j][mode];
+                stiffness[i][j] += stiff * part;
+                drag[i][j] += slows * part;
+            }
+    }
+}
+
+/* Write a row of matrices (n, 9); tell whether all of it is finite. */
+static bool row_of(Floats matrices, int64_t row, Matrix matrix) {
+    double none = 0.0;
+    for (int i = 0; i < 9; i++) {
+        matrix[i / 3][i % 3] = CELL(matrices, row, i);
+        none += 0.0 * CELL(matrices, row, i);
+    }
+    return none == 0.0;
+}
+
+/* Return 1/g of the least gain g, in steps and then by bisection, at which a tip swings by itself; 0 where none up to
+   `most_gain` does. */
+static double index_of(Matrix drag, Matrix stiffness, Matrix process, double most_gain) {
+    double low = 0.0, high = LEAST_GAIN;
+    while (high <= most_gain * (1.0 + 1e-9) && !grows(drag, stiffness, process, high)) {
+        low = high;
+        high *= STEP;
+    }
+    if (high > most_gain * (1.0 + 1e-9))
+        return 0.0;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = (low + high) / 2.0;
+        if (grows(drag, stiffness, process, middle))
+            high = middle;
+        else
+            low = middle;
+    }
+    return 1.0 / high;
+}
+
+/* Write the index (n,) of tips of these flexibilities (n, 9) under process stiffnesses (n, 9); NaN where one is not
+   finite. */
+EXPORT void compliance_coupling_index(Floats flexibility, Floats process, double damping, double most_gain,
                                       Floats index) {
     for (int64_t row = 0; row < index.rows; row++) {
-        Matrix c, k, p;
-        row_of(drag, row, c);
-        row_of(stiffness, row, k);
-        row_of(process, row, p);
-        double low = 0.0, high = LEAST_GAIN;
-        while (high <= most_gain * (1.0 + 1e-9) && !grows(c, k, p, high)) {
-            low = high;
-            high *= STEP;
-        }
-        if (high > most_gain * (1.0 + 1e-9)) {
-            AT(index, row) = 0.0;
+        Matrix f, p, k, c;
+        if (!row_of(flexibility, row, f) || !row_of(process, row, p)) {
+            AT(index, row) = NAN;
             continue;
         }
-        for (int i = 0; i < HALVINGS; i++) {
-            const double middle = (low + high) / 2.0;
-            if (grows(c, k, p, middle))
-                high = middle;
-            else
-                low = middle;
-        }
-        AT(index, row) = 1.0 / high;
+        of_modes(f, damping, k, c);
+        AT(index, row) = index_of(c, k, p, most_gain);
     }
 }

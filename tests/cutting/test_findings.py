@@ -1,13 +1,13 @@
 """Findings on samples that come some at a time, against a plain loop over all of them."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cutting.findings import Cut, Findings
-from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM, largest_chip
+from gcode2krl.cutting.law import THICK_CHIP_MM, THIN_CHIP_MM
 from gcode2krl.tables import Forces, rows_of
 
 SPEEDS_RPM = np.array([0.0, -600.0, 600.0, 590.0, 6000.0, 12000.0])
@@ -67,12 +67,67 @@ def found_in(cut, forces, cell, codes, rows=7_000):
 CHIPS, MODES = {"chip-thin", "chip-thick"}, {"near-mode"}
 
 
+def shares(phi, ramp):
+    """Return the largest chips (n,) over arcs (n, 4) in the front of the cutter, in feeds per tooth."""
+    first, last = phi[:, ::2], phi[:, 1::2]
+    sine = np.where((first <= np.pi / 2) & (last >= np.pi / 2), 1.0, np.fmax(np.sin(first), np.sin(last)))
+    sine = np.fmax.reduce(sine, axis=1, initial=0.0)
+    return np.maximum(np.maximum(sine * np.cos(ramp), np.sin(ramp)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arcs", "gamma", "share"),
+    [
+        ([0.0, np.pi], 0.0, 1.0),
+        ([0.0, np.pi / 6], 0.0, 0.5),
+        ([5 * np.pi / 6, np.pi], 0.0, 0.5),
+        ([0.0, np.pi / 6, 2 * np.pi / 3, np.pi], 0.0, np.sqrt(0.75)),
+        ([np.nan, np.nan, 2.0, 2.5 * np.pi], 0.0, 1.0),
+        ([0.0, 2 * np.pi], np.pi / 2, 1.0),
+        ([0.0, np.pi / 6], 0.3, 0.5 * np.cos(0.3)),
+        ([0.0, np.pi / 6], 0.8, np.sin(0.8)),
+        ([np.pi, 2 * np.pi], 0.0, 0.0),
+        ([np.nan, np.nan], 0.3, 0.0),
+        ([0.0, 2 * np.pi], -np.pi / 2, 0.0),
+    ],
+)
+def test_the_largest_chip_of_arcs_is_at_its_limit_where_its_share_says(arcs, gamma, share):
+    cut, forces = random_cut(1, 100, cell_with_modes())
+    phi = np.tile(arcs, (100, 1))
+    for beside in (0.999_999, 1.000_001):
+        thin, thick = (limit / max(share, 0.01) * beside for limit in (THIN_CHIP_MM, THICK_CHIP_MM))
+        for feed, code, is_wrong in ((thin, "chip-thin", beside < 1.0), (thick, "chip-thick", beside > 1.0)):
+            columns = {"f_z_mm": np.full(100, feed), "ramp_rad": np.full(100, gamma)}
+            cuts = replace(cut, engaged=np.full(100, True), **columns)
+            codes = {
+                issue.code for issue in found_in(cuts, replace(forces, phi_rad=phi), cell_with_modes(), CHIPS)
+            }
+            assert codes == ({code} if is_wrong else set()) if share else codes == {"chip-thin"}
+
+
+def test_cuts_beyond_what_was_measured_are_told_with_their_range():
+    material = {"measured_f_z_mm": [0.02, 0.1], "measured_a_p_mm": [1.0, 4.0]}
+    cell = resolve_cell({"based_on": "demonstration", "material": material})
+    cut, forces = random_cut(2, 20_000, cell)
+    forces = replace(forces, a_p_mm=np.random.default_rng(3).uniform(0.0, 6.0, 20_000))
+    cutting = cut.engaged & (cut.f_z_mm > 0.0)
+    ranges, wrong = [], np.zeros(20_000, dtype=bool)
+    for name, values, low, high in (("f_z", cut.f_z_mm, 0.02, 0.1), ("a_p", forces.a_p_mm, 1.0, 4.0)):
+        beyond = cutting & ((values < low * 0.99) | (values > high * 1.01))
+        ranges.append(f"{name} {values[beyond].min():.3f}..{values[beyond].max():.3f} mm")
+        wrong |= beyond
+    (issue,) = found_in(cut, forces, cell, {"force-unmeasured"})
+    assert issue.line == np.argmax(wrong) + 10
+    assert f"cuts with {', '.join(ranges)}, for" in issue.message
+    assert f"in {wrong.sum() / cutting.sum():.0%} of the time" in issue.message
+
+
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("count", [1, 300, 40_000])
 def test_chips_are_counted_as_one_by_one(seed, count):
     cut, forces = random_cut(seed, count, cell_with_modes())
     rows = [row for row in range(count) if np.isfinite(forces.phi_rad[row, 0]) and cut.f_z_mm[row] > 0.0]
-    chip = largest_chip(forces.phi_rad, cut.f_z_mm, cut.ramp_rad)
+    chip = cut.f_z_mm * shares(forces.phi_rad, cut.ramp_rad)
     expected = []
     for code, wrong in (
         ("chip-thin", [row for row in rows if chip[row] < THIN_CHIP_MM]),

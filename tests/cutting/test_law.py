@@ -8,7 +8,6 @@ from gcode2krl.cell.sections import Kienzle, Material, Tool
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import (
     feed_per_tooth,
-    largest_chip,
     law_array,
     linear_edge_law,
     spindle_power,
@@ -78,24 +77,6 @@ def test_feed_per_tooth():
     omega = 13_000 * 2 * pi / 60  # the paper's cut: 25 mm/s at 13,000 rpm, three teeth
     f_z = feed_per_tooth([25.0, 25.0, 0.0, 25.0], [omega, -omega, omega, 0.0], 3)
     np.testing.assert_allclose(f_z, [0.0385, 0.0385, 0, 0], atol=5e-5)
-
-
-@pytest.mark.parametrize(
-    ("arcs", "gamma", "expected"),
-    [
-        ([0, pi], 0.0, 0.1),
-        ([0, pi / 6], 0.0, 0.05),
-        ([5 * pi / 6, pi], 0.0, 0.05),
-        ([0, pi / 6, 2 * pi / 3, pi], 0.0, 0.1 * math.sin(2 * pi / 3)),
-        ([pi, 2 * pi], 0.0, 0.0),
-        ([np.nan, np.nan], 0.3, 0.0),
-        ([np.nan, np.nan, 2.0, 2.5 * pi], 0.0, 0.1),
-        ([0, 2 * pi], pi / 2, 0.1),
-        ([0, 2 * pi], -pi / 2, 0.0),
-    ],
-)
-def test_largest_chip(arcs, gamma, expected):
-    assert largest_chip([arcs], 0.1, gamma)[0] == pytest.approx(expected, abs=1e-15)
 
 
 def test_power():
