@@ -17,6 +17,8 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from mistake_cases import CELL_HEAD, CELL_TOOLS, CLEAN, LATER, MISTAKES, PROGRAMS, Clean, Mistake
 from mistake_cases_five_axes import FIVE_AXES
 from mistake_cases_hidden import FURTHER, REPORTED

@@ -6,16 +6,12 @@ bull-nose mill of 16 mm with a corner radius of 3 mm, and five with a ball mill 
 5 mm deep). The ball's diameter is not stated; 16 mm is assumed, that of the bull-nose mill of the same day,
 whose sensor had z towards the holder. Their author fitted the coefficients of `slot D25 z2` to the flat
 mill's slots, and takes those of `Al 7075-T6` for the others.
-
-    python benchmarks/measured_slots.py
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from gcode2krl.cell.library import read_model
-from gcode2krl.cell.sections import Material
 from gcode2krl.cutting import mean_force
 from gcode2krl.identify.force import fit_force
 
@@ -114,36 +110,3 @@ def held_out(mill):
 def error_of(predicted_N, cut):
     """Return the error in size and direction of a predicted force, relative to it."""
     return float(np.linalg.norm(predicted_N - cut.measured_N) / np.linalg.norm(predicted_N))
-
-
-def main():
-    for words, options in (
-        ("as recorded", {"zeroed": False}),
-        ("zeroed", {}),
-        ("with air", {"zeroed": False, "in_air": 40}),
-    ):
-        fit = fit_of(MILLS["flat"], MILLS["flat"].cuts, **options)
-        told = [
-            f"{each:.2f}" if known else "-" for each, known in zip(fit.value, fit.determined, strict=True)
-        ]
-        print(f"all five of the flat mill, {words}: {', '.join(told)}; band {fit.relative_band:.1%}")
-    within, seen = [], []
-    print("mill       a_p mm  f_z mm   stated set: error, its band   held out: error, band of the other four")
-    for name, mill in MILLS.items():
-        material = Material.model_validate(read_model("materials", mill.stated))
-        for cut, error, band, inside in held_out(mill):
-            stated = error_of(mill.force_N(cut, material.linear_edge.array()), cut)
-            seen.append(error <= band)
-            verdict = "inside" if seen[-1] else "MISSED"
-            if inside:
-                within.append(seen[-1])
-            else:
-                verdict += ", outside their range: a program there gets force-unmeasured"
-            place = f"{name:9}  {cut.a_p_mm:5.0f}   {cut.f_z_mm:.3f}"
-            of_set = f"{stated:6.1%}  {material.relative_band:6.0%}"
-            print(f"{place}          {of_set}           {error:6.1%}  {band:6.1%}  {verdict}")
-    print(f"inside their band: {sum(seen)} of {len(seen)}, within the range {sum(within)} of {len(within)}")
-
-
-if __name__ == "__main__":
-    main()

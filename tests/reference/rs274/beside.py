@@ -1,13 +1,11 @@
 """A program read by this reader and by LinuxCNC's ``rs274``: do both accept it, and do both move alike?"""
 
-import importlib.util
 import io
 import math
 import os
 import re
 import shutil
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,24 +16,15 @@ from gcode2krl import Gcode2KrlError
 from gcode2krl.errors import Issue
 from gcode2krl.gcode import read_stream
 from gcode2krl.tables import Toolpath
+from tests.reference.rs274 import make
 
-REFERENCE = Path(__file__).resolve().parents[1] / "tests" / "reference" / "rs274"
+REFERENCE = Path(__file__).resolve().parent
 POSITION_MM, FEED_SHARE, CHORD_MM = 1e-6, 1e-6, 0.01
 HEIGHT_SHARE = 1e-9
 FEED_MM_S = 1e-6
 """``rs274`` prints nine decimals: of a small feed in inches too few for its share."""
 LONGEST_S, ENDLESS = 5.0, "runs without an end"
 _PLANES = {"xy": (0, 1, 2), "zx": (2, 0, 1), "yz": (1, 2, 0)}
-
-
-def maker() -> Any:
-    """Return the module that runs ``rs274`` and follows its canonical calls."""
-    spec = importlib.util.spec_from_file_location("rs274_make", REFERENCE / "make.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @dataclass(frozen=True)
@@ -66,10 +55,9 @@ class Beside:
     """``rs274`` in a folder of its own."""
 
     def __init__(self, folder: Path) -> None:
-        self.maker = maker()
         binary = shutil.which("rs274")
         assert binary is not None
-        self.interpreter = self.maker.Interpreter(Path(binary), folder)
+        self.interpreter = make.Interpreter(Path(binary), folder)
         self.environment = {**os.environ, "HOME": str(folder)}
 
     def read(self, program: bytes) -> Read:
@@ -77,17 +65,8 @@ class Beside:
         folder = self.interpreter.folder
         (folder / "program.nc").write_bytes(program)
         (folder / "rs274.var").write_text("", encoding="ascii")
-        command = [
-            str(self.interpreter.binary),
-            "-g",
-            "-n",
-            "2",
-            "-t",
-            "tool.tbl",
-            "-v",
-            "rs274.var",
-            "program.nc",
-        ]
+        options = "-g -n 2 -t tool.tbl -v rs274.var program.nc"
+        command = [str(self.interpreter.binary), *options.split()]
         try:
             done = subprocess.run(
                 command,
@@ -103,9 +82,9 @@ class Beside:
         messages = [line for line in said if line != "executing"]
         if done.returncode:
             return Read([], " | ".join(messages[:2]) or f"exit code {done.returncode}")
-        canon = self.maker.Canon()
+        canon = make.Canon()
         for line in done.stdout.decode("latin-1").splitlines():
-            match = self.maker.CALL.match(line)
+            match = make.CALL.match(line)
             if not match:
                 return Read([], f"printed {line}")
             if match[2] == "PROGRAM_END":

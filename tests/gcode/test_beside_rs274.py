@@ -1,22 +1,18 @@
 """Programs read beside LinuxCNC's interpreter: the draws are valid, and a difference is seen."""
 
 import shutil
-import sys
+from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-
-import gcode_rules as rules
-from gcode_beside_rs274 import Beside, by_us, difference
-from gcode_draws import drawn
-
 from gcode2krl.errors import Issue
+from tests.conftest import ROOT, draws
+from tests.reference.rs274 import rules
+from tests.reference.rs274.beside import ENDLESS, Beside, by_us, difference, is_known
+from tests.reference.rs274.draws import blocks, drawn, slipped
 
-ROOT = Path(__file__).resolve().parents[2]
 with_rs274 = pytest.mark.skipif(shutil.which("rs274") is None, reason="no rs274")
 
 
@@ -29,6 +25,42 @@ def test_a_drawn_program_is_read(number):
     read, toolpath = by_us(drawn(rng(number)))
     assert read.refused == ""
     assert np.isfinite(toolpath.position_mm).all()
+
+
+def unexplained(program, other):
+    """Read a program twice; return how that ends, and what no rule explains."""
+    ours, toolpath = by_us(program)
+    theirs = other.read(program)
+    if ours.refused and theirs.refused:
+        return "both refuse", ""
+    if not (ours.refused or theirs.refused):
+        off = difference(toolpath, theirs.moves)
+        known = not off or is_known(toolpath, theirs.moves)
+        row = off and (rules.why_lost(program, off) or rules.why_unknown(program, known))
+        return "both read", "" if row else off
+    if ours.refused:
+        row = rules.why_refused_here(ours.issue)
+    else:
+        row = "" if theirs.refused == ENDLESS else rules.why_refused_there(theirs.refused)
+    return "one refuses", "" if row else f"{ours.refused or 'read'} here, {theirs.refused or 'read'} there"
+
+
+@pytest.mark.slow
+@with_rs274
+def test_programs_slips_and_blocks_are_read_as_linuxcnc_reads_them(tmp_path):
+    """Valid programs, one-letter slips of them, and random blocks."""
+    other, ends, faults = Beside(tmp_path), Counter(), []
+    for number in range(draws(600)):
+        chance = rng(number)
+        program, share = drawn(chance), chance.random()
+        if share > 0.35:
+            program = slipped(chance, program) if share < 0.8 else blocks(chance)
+        end, fault = unexplained(program, other)
+        ends[end] += 1
+        if fault:
+            faults.append(f"{number}: {fault}\n{program.decode('latin-1')}")
+    assert not faults, "\n".join(faults[:5])
+    assert min(ends["both read"], ends["both refuse"]) > 20
 
 
 def test_draws_are_of_many_kinds():

@@ -1,28 +1,13 @@
-"""Coverage of the 90 % intervals of `gcode2krl identify controller` over random controllers.
+"""Traces of the program of `make-test controller`, made by brute force.
 
-Each draw is a controller with another k (whole cycles of 12 ms), CDIS and law that runs the program of
-`make-test controller`; its trace has another noise, rounding and start. The traces are made here by brute
-force, a numerical moving average at 0.1 ms and the parabola by its own formula, without the planner and the
-reader of the package.
-
-    python benchmarks/identify_controller.py [--draws 200] [--seed 2022]
+A numerical moving average at 0.1 ms and the parabola by its own formula, without the planner and the reader
+of the package; a trace has a noise, a rounding and a start of its own.
 """
 
-import argparse
-import io
 import re
-import sys
-import time
 from dataclasses import dataclass
 
 import numpy as np
-
-from gcode2krl import load_cell, set_targets
-from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gcode import read_stream
-from gcode2krl.identify.controller import identify_controller
-from gcode2krl.identify.trial_program import controller_test_program
-from gcode2krl.runs import ControllerTrace
 
 CYCLE_S = 0.012
 ACC_MM_S2 = 2000.0
@@ -191,77 +176,3 @@ def simulate(
     if rounding_mm:
         position = np.round(position / rounding_mm) * rounding_mm
     return t, position
-
-
-def draw(rng: np.random.Generator) -> tuple[Controller, float]:
-    controller = Controller(
-        k_s=int(rng.integers(8, 21)) * CYCLE_S,
-        cdis_mm=float(rng.uniform(2.0, 12.0)),
-        law=("averages", "trapezoid")[int(rng.integers(2))],
-    )
-    return controller, float(np.exp(rng.uniform(np.log(0.002), np.log(0.020))))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--draws", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=2022)
-    arguments = parser.parse_args()
-    cell = load_cell()
-    text = controller_test_program(cell)
-    targets = set_targets(read_stream(io.BytesIO(text.encode()), "test program", cell), cell)
-    legs = legs_of(text)
-    rng = np.random.default_rng(arguments.seed)
-    rows, seconds, failed, warned = [], [], 0, 0
-    for _ in range(arguments.draws):
-        controller, noise_mm = draw(rng)
-        t, position = simulate(legs, controller, rng, noise_mm=noise_mm)
-        trace = ControllerTrace(t, position, np.arange(len(t)), 0, "trace")
-        start = time.perf_counter()
-        try:
-            found = identify_controller(trace, targets, cell)
-        except Gcode2KrlError as error:
-            failed += 1
-            print(f"failed: {controller}: {error}", file=sys.stderr)
-            continue
-        seconds.append(time.perf_counter() - start)
-        warned += any(issue.severity == "warning" for issue in found.issues)
-        k, cdis = found.k_s, found.cdis_mm
-        rows.append(
-            (
-                k.contains(controller.k_s),
-                k.value - controller.k_s,
-                (k.high - k.low) / 2,
-                cdis is not None and cdis.contains(controller.cdis_mm),
-                cdis.value - controller.cdis_mm if cdis else np.nan,
-                (cdis.high - cdis.low) / 2 if cdis else np.nan,
-                found.law == controller.law,
-                found.k_best_s == controller.k_s,
-            )
-        )
-    table = np.array(rows, dtype=float)
-    covered_k, covered_cdis = table[:, 0].mean(), table[:, 3].mean()
-    print(f"{arguments.draws} draws, {len(t)} samples a trace (the last), {failed} without a result")
-    print(
-        f"  90 % interval of k     covers {covered_k:6.1%}   bias {table[:, 1].mean() * 1e6:+8.2f} us"
-        f"   half-width {np.median(table[:, 2]) * 1e6:8.2f} us (median)"
-    )
-    print(
-        f"  90 % interval of CDIS  covers {covered_cdis:6.1%}   bias {table[:, 4].mean() * 1e3:+8.2f} um"
-        f"   half-width {np.median(table[:, 5]) * 1e3:8.2f} um (median)"
-    )
-    z_k, z_cdis = (1.6449 * table[:, i] / table[:, i + 1] for i in (1, 4))
-    print(
-        f"  errors in sigma        k {z_k.mean():+.2f} +- {z_k.std():.2f}, "
-        f"CDIS {z_cdis.mean():+.2f} +- {z_cdis.std():.2f} (right: 0 +- 1)"
-    )
-    print(
-        f"  right law {table[:, 6].mean():.1%}, right whole cycles applied {table[:, 7].mean():.1%}, "
-        f"warnings {warned}, {np.median(seconds):.3f} s a fit"
-    )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,16 +1,12 @@
 """Drive every state of an RSI session with every fault, and measure the largest step of the correction.
 
-    python benchmarks/online_faults.py --cycles 1000000
-
 An episode brings a session into one phase, adds a fault for some cycles, and goes on. Every answer is
 checked: finite, within the largest correction, at most one step from the answer before (or from zero, where
 the controller was started anew), no answer once closed, nothing changed once held, the IPOC echoed.
 Telegrams are made in memory; one in 50 goes through text and parser.
 """
 
-import argparse
 import itertools
-import sys
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -535,33 +531,3 @@ def drive(cycles: int, seed: int = 1, say: Callable[[str], None] | None = None) 
             if report.cycles >= cycles:
                 break
     return report
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Print the figures; exit code 1 where a limit was broken."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--cycles", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(argv)
-    began_s = time.perf_counter()
-    report = drive(options.cycles, options.seed, lambda words: print(words, file=sys.stderr, flush=True))
-    pairs = sum((phase.value, name) in report.met for phase in PHASES for name in FAULTS)
-    print(f"{report.cycles} cycles, {report.answers} answers, {time.perf_counter() - began_s:.0f} s")
-    print(f"pairs of state and fault that met: {pairs} of {len(PHASES) * len(FAULTS)}")
-    print(f"largest step {report.largest_step:.6f}, largest rate {report.largest_rate:.6f} of the limit")
-    print(
-        f"largest correction {report.largest_sum:.6f} of the limit; "
-        f"slowest answer {report.slowest_s * 1e3:.1f} ms"
-    )
-    for words, count in report.ended.most_common():
-        print(f"  ended {words}: {count}")
-    print(f"violations: {len(report.violations)}")
-    for words in report.violations[:20]:
-        print(f"  {words}")
-    return 1 if report.violations else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,10 +1,8 @@
-"""The index of mode coupling beside a simulation in time of two modes whose force follows the engagement.
+"""Two modes of an arm under a force that follows the engagement, simulated in time; beside it the index.
 
-200 drawn cases: two modes of an arm in drawn directions (masses up to 20 % apart, damping of 1 to 4 %, which
-the index does not know), a flat mill that cuts up or down beside a wall. The simulation follows the force
-through every engagement, lets the tool lose contact, and shares no code with the index.
-
-    python benchmarks/mode_coupling.py
+Drawn: two modes in drawn directions (masses up to 20 % apart, damping of 1 to 4 %, which the index does not
+know), a flat mill that cuts up or down beside a wall. The simulation follows the force through every
+engagement, lets the tool lose contact, and shares no code with the index.
 """
 
 from typing import NamedTuple
@@ -129,26 +127,3 @@ def simulate(cases):
         elif step >= steps - steps // 8:
             late += size
     return late > early
-
-
-def main():
-    cases = draw()
-    index, swings = index_of(cases), simulate(cases)
-    told = index >= 1.0
-    print(f"{len(index)} drawn cases, {swings.sum()} swing in the simulation, {told.sum()} by the index")
-    print(f"agreement {np.mean(told == swings):.3f}")
-    safe, unsafe = np.sum(told & ~swings), np.sum(~told & swings)
-    print(f"misses: {safe} told but stable (the safe side), {unsafe} swing but not told")
-    missed = index[swings & ~told]
-    print(
-        f"  the index of those not told: {', '.join(f'{each:.2f}' for each in np.sort(missed)[::-1]) or '-'}"
-    )
-    for margin in (0.5, 0.75, 1.0, 1.5):
-        print(
-            f"told from {margin:g} on: agreement {np.mean((index >= margin) == swings):.3f}, "
-            f"swings but not told {np.sum((index < margin) & swings)}"
-        )
-
-
-if __name__ == "__main__":
-    main()
