@@ -9,7 +9,6 @@ SCRIPT = ROOT / ".ci" / "run"
 IN_TESTS = {
     "benchmarks/mistakes.py": "tests/test_mistakes.py",
     "benchmarks/blind/calibrate.py": "tests/benchmarks/test_gap_blind_calibrate.py",
-    "benchmarks/blind/channels.py": "tests/benchmarks/test_gap_metamorphic.py",
 }
 """Benchmarks of which a test does a small part, and that test."""
 

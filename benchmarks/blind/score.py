@@ -607,7 +607,7 @@ class Judged:
     cpu_s: float = 0.0
     plant_cpu_s: float = 0.0
     beside_cpu_s: float = 0.0
-    """Oracle and simple methods."""
+    """Of the oracle."""
     foreign: tuple[str, ...] = ()
     """Each kind of noise, or the law of the mismatch, that the usual cases do not have."""
     failed: bool = True
@@ -647,7 +647,6 @@ class Judged:
     errors: tuple[float, ...] = ()
     covered: tuple[bool, ...] = ()
     place: Place = Place()
-    baselines: tuple[tuple[str, bool], ...] = ()
 
     @property
     def observable(self) -> bool:
@@ -742,7 +741,6 @@ def judge(record: dict[str, Any]) -> Judged:
         nats=_least(entries, "two"),
         gap_nats=_most(entries, "mismatch"),
         failed=record.get("error") is not None,
-        baselines=_baselines(record, truths),
         **known,
     )
 
@@ -820,12 +818,3 @@ def _relative_shrink(record: dict[str, Any]) -> float | None:
         return None
     gone = gap["rms_before"] ** 2 - gap["rms_after"] ** 2
     return float(np.clip(gone / known["removed"], 0.0, 1.0))
-
-
-def _baselines(record: dict[str, Any], truths: tuple[Truth, ...]) -> tuple[tuple[str, bool], ...]:
-    """Return for each simple method whether it names the truth and nothing else."""
-    right = sorted(truths, key=str)
-    return tuple(
-        (method, sorted(map(tuple, named), key=str) == right)
-        for method, named in (record.get("baselines") or {}).items()
-    )

@@ -256,8 +256,6 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
         _lost(cases),
     ]
     parts += ["Wrong answers, effects >= noise:", _wrong(cases)]
-    if any(each.baselines for each in cases):
-        parts += ["Simple methods on the same cases, exactly right:", _methods(cases)]
     if driven:
         parts += [f"Ambiguity gone after one more run, {len(driven)} cases that were left open:"]
         parts += [table(("one more run", "settled (95 % bound)", "skipped", "aim"), next_rows(driven))]
@@ -358,17 +356,6 @@ def _wrong(cases: Iterable[Judged]) -> str:
     return text + (f"\n{left} more, each less often than these" if left > 0 else "")
 
 
-def _methods(cases: Sequence[Judged]) -> str:
-    beside = [each for each in cases if each.baselines]
-    single = [each for each in beside if each.kind == "single" and each.observable]
-    null = [each for each in beside if not each.truths]
-    rows = [("diagnose", _plain(rate(e.exact for e in single)), _plain(rate(not e.named for e in null)))]
-    for method in dict.fromkeys(name for each in beside for name, _ in each.baselines):
-        columns = (_plain(rate(dict(e.baselines)[method] for e in group)) for group in (single, null))
-        rows.append((method, *columns))
-    return table(("method", "effect >= noise", "no effect"), rows)
-
-
 def _time(cases: Sequence[Judged]) -> str:
     """Return how long the cases took, and what the whole check takes at that rate."""
     wall, own, plant = (
@@ -386,8 +373,8 @@ def _time(cases: Sequence[Judged]) -> str:
         f"Seconds a case: diagnosis median {np.median(wall):.2f}, worst {wall.max():.2f} (processor "
         f"{np.median(own):.2f}, mean {own.mean():.2f}, worst {own.max():.2f}); plant median "
         f"{np.median(plant):.2f}, worst {plant.max():.2f}.",
-        f"Processor seconds of a case, mean: plant {parts[0]:.2f}, diagnosis {own.mean():.2f}, oracle and "
-        f"simple methods {parts[1]:.2f}: {_share(sum(parts), own.mean())} of a case is not the diagnosis.",
+        f"Processor seconds of a case, mean: plant {parts[0]:.2f}, diagnosis {own.mean():.2f}, oracle "
+        f"{parts[1]:.2f}: {_share(sum(parts), own.mean())} of a case is not the diagnosis.",
         f"At this rate the full check of {sum(full_counts().values())} cases takes {whole_h:.1f} h on two "
         "cores, without the next runs.",
         f"The slowest, processor seconds a case: {', '.join(f'{name} {costs[name]:.0f}' for name in slow)}.",
@@ -420,10 +407,6 @@ def _share(beside_s: float, own_s: float) -> str:
 
 def _count(one: Rate) -> str:
     return f"{one.count}/{one.of}"
-
-
-def _plain(one: Rate) -> str:
-    return f"{one.value:.3f} (n {one.of})" if one.of else "-"
 
 
 def _short(values: Iterable[float | None]) -> str:
