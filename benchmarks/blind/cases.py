@@ -166,7 +166,7 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
     known = {name for shelf in every.values() for name in shelf}
     unknown = {name.partition("@")[0] for name in effects} - known
     if unknown:
-        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.make_cases --list")
+        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.kinds names")
     cases: list[Case] = []
     for number, kind in enumerate(KINDS):
         count = counts.get(kind, 0)
