@@ -1,10 +1,9 @@
 """How often `diagnose` is right on runs of a robot that it has never seen, and its false alarms.
 
 ``python benchmarks/blind/check.py --cases 200 --seed N`` makes cases with the independent plant of
-``tests/plant``, diagnoses each without its label, and prints the table of metrics, what each test did, the
-confusions. ``--full`` is the whole check, ``--full --scale 0.1`` its first
-tenth. Seeds below 30000 are for development and calibration, those from 30000 on are scored; the two never
-mix.
+``tests/plant``, diagnoses each without its label, and prints the table of metrics and the confusions.
+``--full`` is the whole check, ``--full --scale 0.1`` its first tenth. Seeds below 30000 are for development
+and calibration, those from 30000 on are scored; the two never mix.
 """
 
 import argparse

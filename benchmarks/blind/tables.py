@@ -22,7 +22,7 @@ from blind.figures import (
 )
 from blind.next_run import cost as next_cost
 from blind.next_run import rows as next_rows
-from blind.score import NULLS, Ablation, Judged, ablation
+from blind.score import NULLS, Judged
 
 HALF = (0.35, 0.71)
 """Ratios that count as half the noise."""
@@ -248,13 +248,6 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
     if unknown:
         parts += ["Outside the library and taken out of it, effect >= noise, the worst first:"]
         parts += [_by_unknown(unknown)]
-    parts += ["What the tests did to candidates that were not named (wrong ones stopped, right ones lost;"]
-    parts[-1] += " alone: no other test failed, so that without it they would be named):"
-    parts += [
-        _tests(cases),
-        "Right names lost, effects >= noise, and the tests that they failed:",
-        _lost(cases),
-    ]
     parts += ["Wrong answers, effects >= noise:", _wrong(cases)]
     if driven:
         parts += [f"Ambiguity gone after one more run, {len(driven)} cases that were left open:"]
@@ -316,34 +309,6 @@ def _by_unknown(cases: Sequence[Judged]) -> str:
         rows.append((-wrong.value, flagged.value, row))
     head = ("effect", "n", "named", "flagged", "place", "family", "named as")
     return table(head, [row for *_, row in sorted(rows, key=lambda each: each[:2])])
-
-
-def _tests(cases: Sequence[Judged]) -> str:
-    tested = [each for case in cases if case.observable or not case.truths for each in case.tested]
-    rows = [_ablated(each) for each in ablation(tested)]
-    named = [each for each in tested if each.is_named]
-    right = sum(each.is_right for each in named)
-    rows.append(("(named with all tests)", str(len(named) - right), "", str(right), ""))
-    return table(("test", "wrong stopped", "alone", "right lost", "alone"), rows)
-
-
-def _ablated(row: Ablation) -> tuple[str, ...]:
-    numbers = (row.wrong_stopped, row.wrong_alone, row.right_lost, row.right_alone)
-    return (row.test, *map(str, numbers))
-
-
-def _lost(cases: Sequence[Judged]) -> str:
-    """Return each case whose true cause was not named, and which tests it failed."""
-    rows = [
-        (f"{case.kind}-{case.seed:05d}", case.name, case.answer, ", ".join(sorted(each.failed)))
-        for case in cases
-        if case.observable
-        for each in case.tested
-        if each.is_right and not each.is_named
-    ]
-    left = len(rows) - MOST_LINES
-    text = table(("case", "truth", "answer", "failed"), rows[:MOST_LINES]) if rows else "none"
-    return text + (f"\n{left} more" if left > 0 else "")
 
 
 def _wrong(cases: Iterable[Judged]) -> str:
