@@ -246,9 +246,9 @@ class _Longest(NamedTuple):
 
 def _longest(vectors: Floats) -> _Longest:
     """Return the longest of vectors (m, 3)."""
-    found = np.empty(2)
-    row = _find_longest(np.ascontiguousarray(vectors), found)
-    return _Longest(row, float(found[0]), bool(found[1]))
+    longest = np.empty(2)
+    row = _find_longest(np.ascontiguousarray(vectors), longest)
+    return _Longest(row, float(longest[0]), bool(longest[1]))
 
 
 def _absurd_forces(forces: Forces, size_N: Floats, line: Ints32) -> Issue | None:
