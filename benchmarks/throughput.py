@@ -110,12 +110,7 @@ def run(command: Sequence[str], folder: Path) -> Run:
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         start = time.perf_counter()
         process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment(folder),
-            stdout=out,
-            stderr=err,
-            stdin=subprocess.DEVNULL,
+            command, cwd=folder, env=environment(folder), stdout=out, stderr=err, stdin=subprocess.DEVNULL
         )
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start

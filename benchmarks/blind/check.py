@@ -121,12 +121,7 @@ def _runs(folder: Path, program: Writer, effect: str, size: float) -> float:
     robot = mismatch.of_robot(rng)
     for number in range(3):
         run = simulate(
-            program.waypoints(),
-            World(),
-            [fault.hooks(size)],
-            mismatch.of_day(robot, rng),
-            0.0,
-            number,
+            program.waypoints(), World(), [fault.hooks(size)], mismatch.of_day(robot, rng), 0.0, number
         )
         place = folder / f"run-{number + 1}"
         place.mkdir()

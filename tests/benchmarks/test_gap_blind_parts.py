@@ -103,8 +103,7 @@ def test_a_named_cause_states_its_own_family():
 
 
 @pytest.mark.parametrize(
-    ("on", "stated"),
-    [("time_step", "time in the run"), ("own_torque_memory", "own torque")],
+    ("on", "stated"), [("time_step", "time in the run"), ("own_torque_memory", "own torque")]
 )
 def test_words_of_the_label_and_of_the_answer(on, stated):
     tip = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "step"})

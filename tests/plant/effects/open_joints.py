@@ -410,13 +410,7 @@ def supply_sags(draw: Draw):
 
 
 @declare(
-    UNKNOWN,
-    "joint",
-    1e-5,
-    0.5,
-    signal="any",
-    all_runs=True,
-    depends=joint_("smooth", "own_angle", "place"),
+    UNKNOWN, "joint", 1e-5, 0.5, signal="any", all_runs=True, depends=joint_("smooth", "own_angle", "place")
 )
 def tooth_chipped(draw: Draw):
     """A tooth of a gear's last wheel is chipped: the joint kicks each time that this tooth carries.

@@ -250,15 +250,7 @@ def preload_jump(draw: Draw):
     return None, acting(tip, mm=SIZE, warms_s=warms_s, lets_go=lets_go)
 
 
-@declare(
-    UNKNOWN,
-    "sensor",
-    0.002,
-    0.5,
-    signal="tcp",
-    all_runs=True,
-    depends=tip_("smooth", "place"),
-)
+@declare(UNKNOWN, "sensor", 0.002, 0.5, signal="tcp", all_runs=True, depends=tip_("smooth", "place"))
 def reflector_incidence(draw: Draw):
     """The reflector's mirrors are not centred in its ball: the place read depends on how the beam comes in.
 
