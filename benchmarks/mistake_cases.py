@@ -217,9 +217,7 @@ FEED_MISTAKES = (
     Mistake("F0", r"[Ff]eed|F0", {12: "@N90 G1 Z-4. F0"}),
     Mistake("negative F", r"F-600", {12: "@N90 G1 Z-4. F-600."}),
     Mistake(
-        "F with one digit too many, above what the robot does",
-        r"[Ff]eed|F",
-        {13: "@N100 Y70. F150000."},
+        "F with one digit too many, above what the robot does", r"[Ff]eed|F", {13: "@N100 Y70. F150000."}
     ),
     Mistake("inch program with F in mm/min", r"[Ff]eed|F6000", {12: "@N90 Y2.7559 F6000."}, program="inch"),
     Mistake("G95 with F in mm/min", r"[Ff]eed|F|G95", {4: "@N10 G90 G95 G17 G21 G40 G49 G80", 12: "@"}),
@@ -255,10 +253,7 @@ UNIT_MISTAKES = (
     Mistake("decimal point lost in Z, down (thousandths)", r"reach", {12: "@N90 G1 Z-4000 F600."}),
     Mistake("decimal point lost in Z, up", r"reach", {10: "@N70 G43 Z25000 H7"}),
     Mistake(
-        "decimal point lost in a real program",
-        r"reach",
-        {17: "@X1.056 Z-3703"},
-        program="raster_finish.nc",
+        "decimal point lost in a real program", r"reach", {17: "@X1.056 Z-3703"}, program="raster_finish.nc"
     ),
 )
 
@@ -438,11 +433,7 @@ FILE_MISTAKES = (
         name="part.dat",
     ),
     Mistake(
-        "picture given as G-code",
-        r"(?i)binary|text|character|G-code",
-        {3: "@"},
-        data=BINARY,
-        or_whole=True,
+        "picture given as G-code", r"(?i)binary|text|character|G-code", {3: "@"}, data=BINARY, or_whole=True
     ),
 )
 
@@ -451,10 +442,7 @@ ROBOT_MISTAKES = (
     Mistake("stray digit in X, an arc follows", r"reach|radius", {15: "@N120 G1 X2110.", 16: "@"}),
     Mistake("Z far below reach", r"reach", {26: "@N230 G1 Z-2500. F400."}),
     Mistake(
-        "A1 beyond a limit set for the cables",
-        r"A1",
-        {13: "@"},
-        cell=LIMITS.replace("-185, 185", "-3, 3"),
+        "A1 beyond a limit set for the cables", r"A1", {13: "@"}, cell=LIMITS.replace("-185, 185", "-3, 3")
     ),
     Mistake(
         "base low and Z-400 for Z-4.00: A2 beyond its limit",
@@ -469,12 +457,7 @@ ROBOT_MISTAKES = (
         cell="[frames]\nspin = 180\n",
         or_whole=True,
     ),
-    Mistake(
-        "A5 through zero in the cut",
-        r"(?i)singular",
-        {17: "@"},
-        cell=A5_ZERO,
-    ),
+    Mistake("A5 through zero in the cut", r"(?i)singular", {17: "@"}, cell=A5_ZERO),
     Mistake(
         "base in metres",
         r"reach|A\d|metres",

@@ -7,8 +7,6 @@ least that is right: ``warning`` where a person may mean it.
 
 from mistake_cases import CELL_TOOLS, STOCK, SUB, Mistake
 
-FULL_BASE = "base = { x_mm = 1500.0, y_mm = 0.0, z_mm = 800.0, a_deg = 0.0, b_deg = 0.0, c_deg = 0.0 }"
-AFTER_T7 = 6
 TWO_RAPIDS = {14: "@N110 G0 X60. Y40.", 15: "N120 G1 X110. Y80."}
 """A rapid at cutting depth; the move after it leads to the start of the next arc."""
 T9 = {6: "N30 T9 M6", 10: "N70 G43 Z25. H9"}

@@ -1,6 +1,6 @@
 """Seeded real mistakes: does ``gcode2krl translate`` refuse each or warn, with the line and a remedy?
 
-``python benchmarks/mistakes.py [--json]`` runs the cases of ``mistake_cases.py``, ``mistake_cases_hidden.py``
+``python benchmarks/mistakes.py`` runs the cases of ``mistake_cases.py``, ``mistake_cases_hidden.py``
 and ``mistake_cases_five_axes.py`` through the command line's own entry, in a temporary folder, then clean
 programs that must be translated. What passes in silence is named. The exit code is always 0: figures are
 printed, not judged. Cells that contradict themselves stand in ``tests/cell/test_contradictions.py``.
@@ -9,13 +9,14 @@ printed, not judged. Cells that contradict themselves stand in ``tests/cell/test
 import argparse
 import contextlib
 import io
-import json
 import re
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from mistake_cases import CELL_HEAD, CELL_TOOLS, CLEAN, LATER, MISTAKES, PROGRAMS, Clean, Mistake
 from mistake_cases_five_axes import FIVE_AXES
@@ -182,87 +183,49 @@ def _findings(printed: str) -> list[Finding]:
     return found
 
 
-def _table(verdicts: list[Verdict], verbose: bool) -> None:
-    head = f"{'no.':>3}  {'mistake':<58} {'exit':>4}  {'code':<22} {'expected':<12} {'found':>5}  remedy  "
-    print(head + "\n" + "-" * (len(head) + 4))
-    for number, verdict in enumerate(verdicts, start=1):
-        expected = "/".join(map(str, verdict.expected))
-        found = "-" if verdict.found is None else str(verdict.found)
-        remedy = "yes" if verdict.remedy else "no"
-        word = "PASS" if verdict.passed else "FAIL"
-        print(
-            f"{number:>3}  {verdict.title:<58} {verdict.exit_code:>4}  {verdict.code:<22} {expected:<12} "
-            f"{found:>5}  {remedy:<6}  {word}"
-        )
-        if verbose or not verdict.passed:
-            for line in verdict.printed.splitlines()[: None if verbose else 6]:
-                print(f"       | {line}")
-
-
-def _clean_table(outcomes: list[tuple[Clean, Outcome]]) -> None:
-    print("\nclean programs")
-    for case, outcome in outcomes:
-        warnings = sum(finding.severity == "warning" for finding in outcome.findings)
-        word = "PASS" if outcome.exit_code == 0 else "FAIL"
-        print(f"     {case.title:<58} exit {outcome.exit_code}, {warnings} warnings  {word}")
-        if word == "FAIL":
-            for line in outcome.printed.splitlines()[:6]:
-                print(f"       | {line}")
-
-
-def totals(verdicts: list[Verdict], outcomes: list[tuple[Clean, Outcome]]) -> dict[str, int]:
-    """Return the figures."""
-    seen = [verdict for verdict in verdicts if verdict.refused or verdict.warned]
-    return {
-        "mistakes": len(verdicts),
-        "refused": sum(verdict.refused for verdict in verdicts),
-        "warned": sum(verdict.warned for verdict in verdicts),
-        "right_line": sum(verdict.right_line for verdict in seen),
-        "remedy": sum(verdict.remedy for verdict in seen),
-        "passed": sum(verdict.passed for verdict in verdicts),
-        "clean": len(outcomes),
-        "clean_refused": sum(outcome.exit_code != 0 for _, outcome in outcomes),
-    }
-
-
 def main() -> None:
-    """Run everything and print the tables, or one JSON object."""
+    """Run everything and print a line for each case, then the counts."""
     parser = argparse.ArgumentParser(description="Seeded mistakes through gcode2krl translate.")
-    parser.add_argument("--json", action="store_true", help="One JSON object on standard output.")
     parser.add_argument("--verbose", action="store_true", help="Everything that was printed, for each case.")
-    options = parser.parse_args()
-    started = time.perf_counter()
-    verdicts, outcomes = [], []
+    verbose = parser.parse_args().verbose
+    started, verdicts, refused_clean = time.perf_counter(), [], 0
+    print(f"{'mistake':<62} {'exit':>4}  {'code':<22} {'expected':<12} {'found':>5}  remedy")
     for mistake in (*MISTAKES, *REPORTED, *FURTHER, *FIVE_AXES):
         with tempfile.TemporaryDirectory() as folder:
-            verdicts.append(judge(mistake, Path(folder)))
+            verdict = judge(mistake, Path(folder))
+        verdicts.append(verdict)
+        expected, line = (
+            "/".join(map(str, verdict.expected))[:12],
+            "-" if verdict.found is None else verdict.found,
+        )
+        words = f"{verdict.exit_code:>4}  {verdict.code:<22} {expected:<12} {line:>5}  {verdict.remedy!s:<6}"
+        print(f"{verdict.title[:62]:<62} {words} {'PASS' if verdict.passed else 'FAIL'}")
+        _show(verdict.printed, verbose, verdict.passed)
+    print("\nclean programs")
     for clean in CLEAN:
         with tempfile.TemporaryDirectory() as folder:
-            outcomes.append((clean, judge_clean(clean, Path(folder))))
-    figures = totals(verdicts, outcomes)
-    if options.json:
-        result = {
-            "mistakes": [{**asdict(verdict), "passed": verdict.passed} for verdict in verdicts],
-            "clean": [{"title": case.title, "exit_code": outcome.exit_code} for case, outcome in outcomes],
-            "later": list(LATER),
-            "totals": figures,
-        }
-        json.dump(result, sys.stdout, indent=2)
-        print()
-        return
-    _table(verdicts, options.verbose)
-    _clean_table(outcomes)
-    print("\nnot looked at here: " + "; ".join(LATER))
-    count = figures["mistakes"]
-    silent = [verdict.title for verdict in verdicts if not (verdict.refused or verdict.warned)]
-    print(f"pass in silence: {'; '.join(silent) or 'none'}")
-    print(f"\nrefused            {figures['refused']} of {count}")
-    print(f"warned of          {figures['warned']} of {count}")
-    print(f"with right line    {figures['right_line']} of {count}")
-    print(f"with remedy        {figures['remedy']} of {count}")
-    print(f"all three          {figures['passed']} of {count}")
-    print(f"clean refused      {figures['clean_refused']} of {figures['clean']}")
-    print(f"time               {time.perf_counter() - started:.1f} s")
+            outcome = judge_clean(clean, Path(folder))
+        refused_clean += outcome.exit_code != 0
+        print(f"{clean.title:<62} exit {outcome.exit_code}")
+        _show(outcome.printed, verbose, outcome.exit_code == 0)
+    seen = [verdict for verdict in verdicts if verdict.refused or verdict.warned]
+    silent = [verdict.title for verdict in verdicts if verdict not in seen]
+    print(f"\nnot looked at here: {'; '.join(LATER)}\npass in silence: {'; '.join(silent) or 'none'}")
+    for name, count in (
+        ("refused", sum(verdict.refused for verdict in verdicts)),
+        ("warned of", sum(verdict.warned for verdict in verdicts)),
+        ("with right line", sum(verdict.right_line for verdict in seen)),
+        ("with remedy", sum(verdict.remedy for verdict in seen)),
+        ("all three", sum(verdict.passed for verdict in verdicts)),
+    ):
+        print(f"{name:<18} {count} of {len(verdicts)}")
+    print(f"{'clean refused':<18} {refused_clean} of {len(CLEAN)}")
+    print(f"{'time':<18} {time.perf_counter() - started:.1f} s")
+
+
+def _show(printed: str, verbose: bool, passed: bool) -> None:
+    for line in printed.splitlines()[: None if verbose else 0 if passed else 6]:
+        print(f"       | {line}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,11 @@ with a seed and planted in a copy of the tree. Then the tests run that import th
 first, and the golden programs, or those that ``--tests`` names; the first that fails, or hangs, has
 noticed it. The suite must pass without a fault. Some faults change nothing that can be seen, so that no
 suite notices all: what counts is the same seed before and after a change of the tests.
+
+``--covered`` asks the whole suite at less cost: it names what a run of the suite has written with
+``pytest --cov=gcode2krl --cov-context=test`` (pytest-cov). Of a fault in a Python function those tests run
+that execute its line, since no other can notice it; of one elsewhere in a module those that run a function
+of it.
 """
 
 import argparse
@@ -173,27 +178,88 @@ def tests_of(file: Path) -> list[str]:
     return [path.relative_to(ROOT).as_posix() for path in chosen]
 
 
+class Covered:
+    """The tests that execute each line of the package, as a run under coverage has written them."""
+
+    def __init__(self, file: Path) -> None:
+        from coverage import CoverageData
+
+        self.data = CoverageData(basename=str(file))
+        self.data.read()
+        self.names = {
+            str(Path(name).relative_to(_package_above(name))): name for name in self.data.measured_files()
+        }
+
+    def tests_of(self, fault: Fault) -> list[str]:
+        """Return the tests that can notice a fault, the nearest first; of C those of its area."""
+        name = self.names.get(str(fault.file))
+        if name is None:
+            return tests_of(fault.file)
+        text = (ROOT / fault.file).read_text(encoding="utf-8")
+        line = text.count("\n", 0, fault.start) + 1
+        inside = [
+            range(node.body[0].lineno, node.end_lineno + 1)
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.FunctionDef)
+        ]
+        lines = {line} if any(line in body for body in inside) else {at for body in inside for at in body}
+        by_line = self.data.contexts_by_lineno(name)
+        tests = {context.rpartition("|")[0] for at in lines & set(by_line) for context in by_line[at]} - {""}
+        order = {file: place for place, file in enumerate(tests_of(fault.file))}
+        golden = [file for file in order if file.startswith("tests/golden/")]
+        nearest = sorted(tests, key=lambda test: (order.get(test.partition("::")[0], len(order)), test))
+        return list(dict.fromkeys([*nearest, *golden]))
+
+
+def _package_above(name: str) -> Path:
+    """Return the folder that holds the package in which a measured file lies."""
+    return next(folder.parent for folder in reversed(Path(name).parents) if folder.name == "gcode2krl")
+
+
 def notices(copy: Path, fault: Fault, tests: list[str], *, slow: bool) -> bool:
-    """Tell whether the tests fail with a fault planted in the copy."""
+    """Tell whether the tests fail with a fault planted in the copy, and pass without it."""
     target = copy / fault.file
     sound = target.read_text(encoding="utf-8")
-    target.write_text(fault.planted(sound), encoding="utf-8", newline="\n")
+    try:
+        target.write_text(fault.planted(sound), encoding="utf-8", newline="\n")
+        if fault.file.suffix == ".c":
+            return not _build(copy) or _failed(copy, tests, slow) is not None
+        while (failed := _failed(copy, tests, slow)) and "::" in failed:
+            target.write_text(sound, encoding="utf-8", newline="\n")
+            if _failed(copy, [failed], slow) is None:
+                break
+            tests = [
+                test for test in tests if test not in (failed, failed.partition("::")[0])
+            ]  # not for the fault
+            target.write_text(fault.planted(sound), encoding="utf-8", newline="\n")
+        return failed is not None
+    except subprocess.TimeoutExpired:
+        return True
+    finally:
+        target.write_text(sound, encoding="utf-8", newline="\n")
+
+
+def _failed(copy: Path, tests: list[str], slow: bool) -> str | None:
+    """Run tests until one fails; return its name, "" where none could be collected, None where all pass."""
     environment = os.environ | {
         "PYTHONPATH": str(copy),
         "GCODE2KRL_CORE": "plain",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *tests]
-    try:
-        if fault.file.suffix == ".c" and not _build(copy):
-            return True
-        command += ["-m", "slow or not slow"] if slow else []
-        done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, timeout=LONGEST_S)
-        return done.returncode not in (0, 5)  # 5: no test was chosen
-    except subprocess.TimeoutExpired:
-        return True
-    finally:
-        target.write_text(sound, encoding="utf-8", newline="\n")
+    (copy / "asked.txt").write_text("\n".join(tests), encoding="utf-8")  # too many for a command line
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "@asked.txt"]
+    command += ["-m", "slow or not slow"] if slow else []
+    done = subprocess.run(
+        command, cwd=copy, env=environment, capture_output=True, text=True, timeout=LONGEST_S
+    )
+    if done.returncode in (0, 5):  # 5: no test was chosen
+        return None
+    if done.returncode == 4 and any(
+        "::" in test for test in tests
+    ):  # a module that fails has no test by name
+        return _failed(copy, list(dict.fromkeys(test.partition("::")[0] for test in tests)), slow)
+    name = re.search(r"^(?:FAILED|ERROR) (\S+::.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
+    return name[1] if name else ""
 
 
 def _build(copy: Path) -> bool:
@@ -220,9 +286,12 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--tests", nargs="+", help="test files or folders instead of those that import the module"
     )
+    parser.add_argument("--covered", type=Path, help="a .coverage file of the suite: the tests by line")
+    parser.add_argument("--begin", type=int, default=0, help="leave out the first faults that are drawn")
     parser.add_argument("--slow", action="store_true", help="the slow tests too")
     chosen = parser.parse_args(argv)
-    faults = drawn(chosen.area or ["gcode2krl", "native"], chosen.count, chosen.seed)
+    faults = drawn(chosen.area or ["gcode2krl", "native"], chosen.count, chosen.seed)[chosen.begin :]
+    covered = Covered(chosen.covered) if chosen.covered else None
     noticed = 0
     with tempfile.TemporaryDirectory(prefix="faults_") as folder:
         copy = Path(folder) / "tree"
@@ -237,7 +306,8 @@ def main(argv: list[str] | None = None) -> int:
         for fault in faults:
             if not built and fault.file.suffix == ".py":
                 built = _build(copy)
-            seen = notices(copy, fault, chosen.tests or tests_of(fault.file), slow=chosen.slow)
+            tests = chosen.tests or (covered.tests_of(fault) if covered else tests_of(fault.file))
+            seen = notices(copy, fault, tests, slow=chosen.slow)
             built = built and fault.file.suffix == ".py"
             noticed += seen
             print("noticed" if seen else "MISSED ", fault, flush=True)

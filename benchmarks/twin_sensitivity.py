@@ -1,7 +1,7 @@
 """Sensitivity of the four figures of `online simulate`: one parameter at a time, then filters and delays.
 
 The defaults are stated, plausible values; none was fitted to a figure. The last table runs over all plausible
-filters and delays together and prints the range beside the defaults' figures; `--plot FILE` draws the first.
+filters and delays together and prints the range beside the defaults' figures.
 
     python benchmarks/twin_sensitivity.py                 the test piece, about two minutes
     python benchmarks/twin_sensitivity.py --small         every third parameter at one end, two combinations
@@ -99,19 +99,15 @@ def row(label, values, mark=""):
 
 
 def table(prediction, defaults, small):
-    """Print the effect of each change; returns name -> (values, figures)."""
-    drawn = {}
+    """Print the effect of each change."""
     for name, key, values, kind in ONE_AT_A_TIME[:: 3 if small else 1]:
         print(name)
-        found = []
         default = getattr(World() if kind == "world" else Online(), key)
         default = Online().pilot_lead_s if default is None else default
         chosen = sorted({default, values[-1]}) if small else values
         for value in chosen:
-            found.append(defaults if value == default else figures(prediction, {key: value}))
-            row(f"{value:g}", found[-1], "   default" if value == default else "")
-        drawn[name] = (chosen, found)
-    return drawn
+            found = defaults if value == default else figures(prediction, {key: value})
+            row(f"{value:g}", found, "   default" if value == default else "")
 
 
 def plausible_range(prediction, small):
@@ -175,28 +171,11 @@ def over_play():
             print(f"  {words:<38}{removed}   {achieved}")
 
 
-def draw(drawn, file):
-    """Draw the figures over each changed value."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(13.0, 12.0), layout="constrained")
-    panels = figure.subplots(5, 3).ravel()
-    for axes, (name, (values, found)) in zip(panels, drawn.items(), strict=False):
-        for k, case in enumerate(CASES):
-            axes.plot(values, [one[k] for one in found], marker="o", ms=3, label=case)
-        axes.set_xlabel(name)
-        axes.set_ylim(bottom=0.0)
-    panels[0].legend(frameon=False, fontsize=8)
-    figure.supylabel("Largest deviation normal to the feed (mm)")
-    figure.savefig(file, dpi=120)
-
-
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--small", action="store_true")
-    parser.add_argument("--plot", type=Path)
     parser.add_argument("--only", choices=["depths", "play"])
     options = parser.parse_args()
     cell = load_cell().model_copy(update={"stock": STOCK})
@@ -207,10 +186,8 @@ def main():
     print(" " * 36 + "".join(f"{case:>14}" for case in CASES))
     defaults = figures(prediction, {})
     row("defaults", defaults)
-    drawn = table(prediction, defaults, options.small)
+    table(prediction, defaults, options.small)
     plausible_range(prediction, options.small)
-    if options.plot is not None:
-        draw(drawn, options.plot)
 
 
 if __name__ == "__main__":

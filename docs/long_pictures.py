@@ -1,13 +1,10 @@
 """Draw the pictures of a program of 15,000 lines that `docs/prediction.md` shows.
 
-    python docs/long_pictures.py                             docs/images/long_*.png
-    python docs/long_pictures.py --tree PATH --name before   the same by the code of another checkout
+    python docs/long_pictures.py    docs/images/long_*.png
 
 The pictures are halved in size and brought to 256 colours, to some 100 kB each.
 """
 
-import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -22,24 +19,13 @@ WIDTH_PX = 1000
 COLOURS = 256
 
 
-def predict(tree: Path, folder: Path) -> Path:
-    """Return the folder of a prediction of the pocket, made by the code of a checkout."""
+def predict(folder: Path) -> Path:
+    """Return the folder of a prediction of the pocket."""
     make = [sys.executable, str(ROOT / "examples" / "make_examples.py"), "--out", str(folder), "--pocket"]
     subprocess.run(make, check=True)
-    cell = folder / "cell.toml"
-    cell.write_text(STOCK, encoding="utf-8")
-    words = [
-        "predict",
-        str(folder / "adaptive_pocket.nc"),
-        "--cell",
-        str(cell),
-        "-o",
-        str(folder / "p"),
-        "--plot",
-    ]
-    environment = {**os.environ, "PYTHONPATH": str(tree)}
-    command = [sys.executable, "-m", "gcode2krl", *words, "--quiet"]
-    subprocess.run(command, check=True, cwd=tree, env=environment)
+    (folder / "cell.toml").write_text(STOCK, encoding="utf-8")
+    words = ["predict", "adaptive_pocket.nc", "--cell", "cell.toml", "-o", "p", "--plot", "--quiet"]
+    subprocess.run([sys.executable, "-m", "gcode2krl", *words], check=True, cwd=folder)
     return folder / "p"
 
 
@@ -53,16 +39,11 @@ def shrink(source: Path, target: Path) -> None:
 
 
 def main() -> None:
-    """Read the options and draw."""
-    parser = argparse.ArgumentParser(description="Draw the pictures of a program of 15,000 lines.")
-    parser.add_argument("--tree", type=Path, default=ROOT, help="checkout whose code draws, its core built")
-    parser.add_argument("--name", default="long", help="what the files' names begin with")
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
-    options = parser.parse_args()
+    """Draw."""
     with tempfile.TemporaryDirectory() as folder:
-        drawn = predict(options.tree.resolve(), Path(folder))
+        drawn = predict(Path(folder))
         for picture in PICTURES:
-            target = options.out / f"{options.name}_{picture}.png"
+            target = ROOT / "docs" / "images" / f"long_{picture}.png"
             shrink(drawn / f"{picture}.png", target)
             print(f"{target}: {target.stat().st_size / 1000:.0f} kB")
 

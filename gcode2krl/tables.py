@@ -43,7 +43,7 @@ class Restart:
     """G-code line whose move is the first; the one before ``line`` where ``line`` begins in material."""
     way_rows: int = 0
     """Rows of the Toolpath, from row 1 on, that lead to the first position."""
-    left: object = field(default=None, repr=False)
+    material: object = field(default=None, repr=False)
     """The material that the lines before have left, `cutting.height_field` or `cutting.dexels`; None: raw."""
 
 

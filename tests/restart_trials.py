@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.strangers import _into_reach
 from gcode2krl import Gcode2KrlError, load_cell, read_gcode, write_krl
 from gcode2krl.krl.read import read_texts
 from gcode2krl.krl.release import NEVER_RELEASED
@@ -33,6 +32,23 @@ class Trial:
     path: bool = False
     rapid: bool = False
     guard: bool = False
+
+
+def _into_reach(part):
+    """Return a ``$BASE`` that puts the middle of the program where the demonstration cell reaches well."""
+    try:
+        path = read_gcode(part, load_cell())
+    except Gcode2KrlError:
+        return ""
+    place = path.position_mm[1:][~path.machine[1:]]
+    if len(place) == 0:
+        return ""
+    low, high = place.min(axis=0), place.max(axis=0)
+    x_mm, y_mm, z_mm = (*(-(low + high)[:2] / 2.0), -low[2])
+    base = f"x_mm = {1600.0 + x_mm:.1f}, y_mm = {y_mm:.1f}, z_mm = {760.0 + z_mm:.1f}"
+    base += ", a_deg = 0.0, b_deg = 0.0, c_deg = 0.0"
+    plane = f"[clearance]\nz_mm = {max(100.0, high[2] + 5.0):.1f}\n"
+    return f'[frames]\nspin = "auto"\nbase = {{ {base} }}\n{plane}'
 
 
 def cell_for(part, tools):

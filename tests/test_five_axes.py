@@ -145,7 +145,7 @@ def test_predict_has_forces_and_says_what_is_less_sure():
 def test_the_part_is_written_as_a_closed_mesh():
     cell = load_cell(CELL)
     prediction = predict(PART, cell)
-    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).left
+    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).material
     mesh = dexels_to_mesh(left)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(left.volume_mm3, rel=0.003)
@@ -159,7 +159,7 @@ def test_a_restart_goes_on_with_what_is_left(tmp_path, from_line):
     whole = predict(PART, cell)
     begun = restarted(read_gcode(PART, cell), from_line, cell)
     rest = predict_toolpath(begun, cell)
-    left = [remove(one.toolpath, one.motion, cell, is_checked=False).left for one in (whole, rest)]
+    left = [remove(one.toolpath, one.motion, cell, is_checked=False).material for one in (whole, rest)]
     assert left[1].volume_mm3 == pytest.approx(left[0].volume_mm3, rel=1e-4)
     met = [
         {i.line for i in one.issues if i.code in ("rapid-in-stock", "stock-untouched")}
@@ -187,7 +187,7 @@ def test_the_part_is_shown_with_its_error():
     cell = load_cell(CELL)
     prediction = predict(PART, cell)
     history = history_of(prediction.toolpath, prediction.motion, cell)
-    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).left
+    left = remove(prediction.toolpath, prediction.motion, cell, is_checked=False).material
     assert history.volume_mm3() == pytest.approx(left.volume_mm3, rel=0.005)
     points, _ = history.surface()
     off_mm = history.error_mm(prediction.deflection.deflection_base_mm)

@@ -45,7 +45,7 @@ def test_from_the_raw_part_the_same_way_down_would_cut():
     """What the material as cut so far is for: without it the plunge meets the full block."""
     cell = stated()
     rest = restarted(read(SLOT, cell), SECOND_HALF, cell)
-    raw = predict_toolpath(replace(rest, restart=replace(rest.restart, left=None)), cell)
+    raw = predict_toolpath(replace(rest, restart=replace(rest.restart, material=None)), cell)
     x_mm, z_mm = raw.motion.position_mm[:, 0], raw.motion.position_mm[:, 2]
     down = (abs(x_mm - 100.0) < 1e-6) & (z_mm < -1.0)
     assert np.linalg.norm(raw.forces.force_base_N[down], axis=1).max() > 50.0

@@ -142,7 +142,7 @@ def test_a_pulse_is_a_signal(tmp_path):
 
 def test_memory_of_a_parent_is_not_counted():
     common = str(__import__("pathlib").Path(__file__).parents[1] / "benchmarks")
-    child = f"import sys; sys.path.insert(0, {common!r}); import fuzz_common; print(fuzz_common.peak_mb())"
+    child = f"import sys; sys.path.insert(0, {common!r}); import fuzz; print(fuzz.peak_mb())"
     parent = (
         "import subprocess, sys; held = bytearray(700_000_000)\n"
         f"print(subprocess.run([sys.executable, '-c', {child!r}], capture_output=True, text=True).stdout)"

@@ -17,7 +17,7 @@ import json
 import math
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -261,7 +261,6 @@ _LEAST_SLOPE = 0.5
 """However wrong some unseen effects are, all tests keep half of their say."""
 COVERAGE = 0.95
 _BINS = 10
-Weigh = Callable[[Sequence[Row]], Floats]
 
 
 def weights_of(rows: Sequence[Row]) -> Floats:

@@ -1,22 +1,17 @@
-"""Cases of the check: which seed asks for what, and one case made, diagnosed, and set beside simpler means.
+"""Cases of the check: which seed asks for what, and one case made, diagnosed, and set beside an oracle.
 
 Every kind has its own block of seeds behind the first one, so that asking for more cases never changes those
 already done, and a part of the check is the first cases of each kind. Seeds below ``SCORED_FROM`` are for
 development and calibration; what is scored starts there. The plant makes a case, the diagnosis answers
-without its label, a record keeps both. Cases run on processes of this machine, or on a Dask cluster; each
-record is stored when made.
+without its label, a record keeps both. Each record is stored
+when made; records of several machines may be copied into one folder.
 
 **Oracle.** How far the gap shrinks if the effect, its target and its parameters are known. The effect is put
 into the model by the library's own implementation and with the true parameters. Where the plant's effect has
 another form than the library's, the oracle takes the size that fits best instead, normal mismatch of the
 signal fitted beside it: per run a shift, a clock, for forces a gain.
-
-**Simple methods** see the whole signals, scaled by the noise of each column and without a split of the chain,
-at 20 samples a second, and the signatures of all effects by finite differences at the nominal prediction. The
-clocks of the tables are fitted to each run first.
 """
 
-import functools
 import hashlib
 import itertools
 import json
@@ -24,7 +19,6 @@ import math
 import multiprocessing
 import shutil
 import sys
-import tempfile
 import time
 import traceback
 from collections import Counter
@@ -172,7 +166,7 @@ def plan(first_seed: int, counts: dict[str, int], effects: Sequence[str] = ()) -
     known = {name for shelf in every.values() for name in shelf}
     unknown = {name.partition("@")[0] for name in effects} - known
     if unknown:
-        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.make_cases --list")
+        raise ValueError(f"no effect {', '.join(sorted(unknown))}; python -m tests.plant.kinds names")
     cases: list[Case] = []
     for number, kind in enumerate(KINDS):
         count = counts.get(kind, 0)
@@ -232,182 +226,6 @@ def predictions(folder: Path) -> dict[str, str]:
             predict(part, load_cell(cell_file)).save(place)
         places[name] = place.resolve().as_posix()
     return places
-
-
-STEP_s = 0.05
-LEAST_GAIN = 0.02
-"""Fraction of the power that a method must remove to name a cause."""
-LASSO_STEPS, LASSO_SWEEPS, LASSO_NAMED = 12, 40, 0.25
-
-
-def baselines(runs: Sequence[Any], predictions: dict[str, str]) -> dict[str, list]:
-    """Return the effect and target that each method names, or an empty list."""
-    started = [run.head.started for run in runs]
-    first = min(started)
-    data, columns = [], []
-    for run in runs:
-        program = (run.path("prediction") or Path()).name
-        hours = (run.head.started - first).total_seconds() / 3600.0
-        blocks, base = signatures(predictions[program], round(hours, 1))
-        y, use, sigma = _residual(run, base)
-        late = _clocks(base, use, sigma)
-        wide = np.concatenate([(block[:, use] / sigma).T.reshape(-1, 1) for _, block in blocks], axis=1)
-        data.append(y - late @ (late.T @ y))
-        columns.append(wide - late @ (late.T @ wide))
-        keys = [key for key, _ in blocks]
-    y = np.concatenate(data)
-    wide = np.concatenate(columns)
-    length = np.sqrt(np.sum(wide**2, axis=0))
-    wide = wide / np.where(length > 1e-9, length, 1.0)
-    groups = list(dict.fromkeys(keys))
-    member = np.array([groups.index(key) for key in keys])
-    return {
-        "best correlation": _best_correlation(y, wide, member, groups),
-        "lasso": _lasso(y, wide, member, groups),
-        "always geometry": [["base_frame", None]],
-    }
-
-
-def _best_correlation(y: np.ndarray, wide: np.ndarray, member: np.ndarray, groups: list) -> list:
-    found = np.abs(wide.T @ y)
-    best = int(np.argmax(found))
-    return [list(groups[member[best]])] if found[best] ** 2 > LEAST_GAIN * float(y @ y) else []
-
-
-def _lasso(y: np.ndarray, wide: np.ndarray, member: np.ndarray, groups: list) -> list:
-    """Coordinate descent along a falling penalty (Friedman et al. 2010), chosen by Schwarz' criterion."""
-    gram, right, power = wide.T @ wide, wide.T @ y, float(y @ y)
-    best, chosen = np.inf, np.zeros(wide.shape[1])
-    weights = np.zeros(wide.shape[1])
-    top = float(np.abs(right).max())
-    for penalty in top * np.geomspace(0.9, 0.02, LASSO_STEPS):
-        weights = _descend(gram, right, weights, penalty)
-        rest = power - 2.0 * float(weights @ right) + float(weights @ gram @ weights)
-        score = len(y) * np.log(max(rest, 1e-12)) + np.count_nonzero(weights) * np.log(len(y))
-        if score < best:
-            best, chosen = score, weights.copy()
-    gain = np.array(
-        [np.linalg.norm(wide[:, member == g] @ chosen[member == g]) ** 2 for g in range(len(groups))]
-    )
-    if gain.max() <= LEAST_GAIN * power:
-        return []
-    return [list(groups[g]) for g in np.argsort(-gain) if gain[g] > LASSO_NAMED * gain.max()][:3]
-
-
-def _descend(gram: np.ndarray, right: np.ndarray, start: np.ndarray, penalty: float) -> np.ndarray:
-    weights = start.copy()
-    for sweep in range(LASSO_SWEEPS):
-        active = np.flatnonzero(weights) if sweep % 5 else np.arange(len(weights))
-        before = weights.copy()
-        for j in active:
-            pull = right[j] - gram[j] @ weights + gram[j, j] * weights[j]
-            weights[j] = np.sign(pull) * max(abs(pull) - penalty, 0.0) / max(gram[j, j], 1e-12)
-        if sweep % 5 == 0 and np.abs(weights - before).max() < 1e-4 * max(np.abs(weights).max(), 1e-12):
-            break
-    return weights
-
-
-# signals ----------------------------------------------------------------------------------------------------
-
-
-@functools.lru_cache(maxsize=64)
-def signatures(folder: str, hours: float) -> tuple[list[tuple[tuple, np.ndarray]], dict[str, np.ndarray]]:
-    """Return (effect, target) and change of all signals (m, 24) for each setting; and the nominal signals."""
-    from dataclasses import replace
-
-    inputs, base, blocks = _nominal(folder)
-    moved = replace(inputs, hours=hours)
-    dated = [
-        ((effect.name, target), _change(moved, base, effect, target, values))
-        for effect, target, values in _settings(inputs, dated=True)
-    ]
-    return [*blocks, *[(key, change) for key, change in dated if change is not None]], base
-
-
-@functools.lru_cache(maxsize=8)
-def _nominal(folder: str) -> tuple[Any, dict[str, np.ndarray], list]:
-    from gcode2krl import Prediction
-    from gcode2krl.effects import inputs_of, simulate
-
-    inputs = inputs_of(Prediction.load(folder))
-    signals = simulate(inputs, [])
-    grid = np.arange(0.0, inputs.time_s[-1], STEP_s)
-    base = {"t_s": grid, "all": _columns(signals, grid), "turn": inputs.sensor_rotation[0]}
-    base["tool"] = inputs.tool_rotation[0]
-    blocks = [
-        ((effect.name, target), _change(inputs, base, effect, target, values))
-        for effect, target, values in _settings(inputs, dated=False)
-    ]
-    return inputs, base, [(key, change) for key, change in blocks if change is not None]
-
-
-def _settings(inputs: Any, dated: bool) -> list:
-    from gcode2krl.effects import library
-
-    found = []
-    for effect in library().values():
-        if effect.kind == "slip" or (effect.name in ("thermal", "force_drift")) != dated:
-            continue
-        for target in effect.targets(inputs.cell):
-            own = effect.at(target)
-            for shape in own.shapes():
-                found += [(own, target, values) for values in own.settings(inputs, target, shape)]
-    return found
-
-
-def _change(inputs: Any, base: dict, effect: Any, target: str | None, values: dict) -> np.ndarray | None:
-    from gcode2krl.effects import Applied, simulate
-    from gcode2krl.errors import Gcode2KrlError
-
-    try:
-        signals = simulate(inputs, [Applied(effect, target, values)])
-    except Gcode2KrlError:
-        return None
-    return _columns(signals, base["t_s"]) - base["all"]
-
-
-def _columns(signals: Any, grid: np.ndarray) -> np.ndarray:
-    """Return (m, 24): tip, force, q_cmd, q_act - q_cmd, q_load - q_act at the stamps of a grid."""
-    cmd, act, load = (signals.seen(name, grid) for name in ("q_cmd_rad", "q_act_rad", "q_load_rad"))
-    tip, force = signals.seen("tcp_base_mm", grid), signals.seen("force_meas_base_N", grid)
-    return np.concatenate([tip, force, cmd, act - cmd, load - act], axis=1)
-
-
-def _clocks(base: dict, use: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return (k·m, c) orthonormal: the effect of a clock of tracker, force, controller or load encoders."""
-    rate = np.gradient(base["all"], STEP_s, axis=0)
-    rate[:, 18:] = rate[:, 6:12]
-    tables = [range(3), range(3, 6), range(6, 12), range(18, 24)]
-    columns = [np.where(np.isin(use, table), rate[:, use] / sigma, 0.0).T.ravel() for table in tables]
-    late, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
-    return late[:, sizes > 1e-9 * sizes[0]]
-
-
-def _residual(run: Any, base: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the residual over its noise (k·m,), the columns that were measured (k,), their noise (k,)."""
-    grid, nominal = base["t_s"], base["all"]
-    measured = np.full(nominal.shape, np.nan)
-    if run.tracker is not None:
-        measured[:, :3] = _at(grid, run.tracker.time_s, run.tracker.position_mm)
-    if run.force is not None:
-        turn = {"sensor": base["turn"], "tcp": base["tool"]}.get(run.head.frames.force, np.eye(3))
-        measured[:, 3:6] = _at(grid, run.force.time_s, run.force.force_N @ turn.T)
-    table = run.controller
-    if table is not None and table.q_cmd_rad is not None and table.q_act_rad is not None:
-        measured[:, 6:12] = _at(grid, table.time_s, table.q_cmd_rad)
-        measured[:, 12:18] = _at(grid, table.time_s, table.q_act_rad - table.q_cmd_rad)
-        if table.q_load_rad is not None:
-            measured[:, 18:] = _at(grid, table.time_s, table.q_load_rad - table.q_act_rad)
-    use = np.flatnonzero(np.isfinite(measured).all(axis=0))
-    apart = measured[:, use] - nominal[:, use]
-    jumps = np.abs(np.diff(apart, n=2, axis=0))
-    sigma = np.maximum(np.median(jumps, axis=0) / 0.6745 / np.sqrt(6.0), 1e-6)
-    sigma[use < 6] = np.maximum(sigma[use < 6], 1e-3)
-    return (apart / sigma).T.ravel(), use, sigma
-
-
-def _at(grid: np.ndarray, own_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(grid, own_s, column) for column in values.T], axis=1)
 
 
 LINK = {"timing": "PATH", "joint_commanded": "PATH", "joint_actual": "SERVO", "joint_load": "GEAR"}
@@ -562,8 +380,6 @@ class How:
     """What is computed for every case."""
 
     oracle: bool = True
-    baselines: int = 5
-    """Simple methods beside each case whose seed is a multiple of this; 0: none."""
     keep: bool = False
     """Keep the runs of the case."""
     code: str = ""
@@ -593,7 +409,7 @@ def run_case(case: Case, folder: Path, how: How, predictions: dict[str, str]) ->
     try:
         _diagnose(case, place / "case", record)
         own = time.process_time()
-        _beside(case, place / "case", how, record, predictions)
+        _beside(case, place / "case", how, record)
         record["beside_cpu_s"] = time.process_time() - own
     except Exception:  # the check goes on, and shows it
         record["error"] = traceback.format_exc()
@@ -648,8 +464,8 @@ def _diagnose(case: Case, folder: Path, record: dict[str, Any]) -> None:
     record["diagnosis_cpu_s"] = time.process_time() - own
 
 
-def _beside(case: Case, folder: Path, how: How, record: dict[str, Any], predictions: dict[str, str]) -> None:
-    """Add the results of an oracle and of simple methods on the same case."""
+def _beside(case: Case, folder: Path, how: How, record: dict[str, Any]) -> None:
+    """Add the result of an oracle on the same case, and of many effects what named causes leave."""
     label = record["label"]
     first = label["effects"][0] if label["effects"] else {"effect": "", "ratio": 0.0}
     possible = case.kind in ("single", "slip") and first["effect"] not in NOT_PREDICTED
@@ -657,20 +473,9 @@ def _beside(case: Case, folder: Path, how: How, record: dict[str, Any], predicti
         record["oracle"] = oracle(label, record["result"], *loaded(folder))
     if case.kind == "many":
         record["rests"] = rests(label, record["result"], *loaded(folder))
-    beside = how.baselines and case.seed % how.baselines == 0
-    if beside and case.kind in (*NULLS, "single"):
-        record["baselines"] = baselines(loaded(folder)[0], predictions)
 
 
 Result = TypeVar("Result")
-NO_DASK = (
-    "check: --scheduler needs Dask, which is not installed: python -m pip install distributed. Without "
-    "--scheduler the cases run on processes of this machine"
-)
-
-
-class NoClusterError(Exception):
-    """The cluster that was asked for cannot be used; the message says why."""
 
 
 def done(case: Case, folder: Path, code: str | None) -> dict[str, Any] | None:
@@ -695,20 +500,10 @@ def store(record: dict[str, Any], folder: Path) -> None:
 
 
 def fresh_records(
-    cases: Sequence[Case],
-    folder: Path,
-    how: How,
-    jobs: int,
-    scheduler: str | None,
-    until_s: float = math.inf,
+    cases: Sequence[Case], folder: Path, how: How, jobs: int, until_s: float = math.inf
 ) -> Iterator[dict[str, Any]]:
-    """Yield the record of each case as soon as it is made.
-
-    ``until_s``: of `time.monotonic`; no case begins later (on a cluster all of them are made).
-    """
-    if scheduler is not None:
-        yield from _on_cluster(cases, how, scheduler)
-    elif cases:
+    """Yield the record of each case as soon as it is made; none begins later than this `time.monotonic`."""
+    if cases:
         places = predictions(folder / "predictions" / how.code)
         asked = ((case, folder, how, places) for case in cases)
         yield from in_processes(run_case, asked, jobs, until_s)
@@ -729,42 +524,6 @@ def in_processes(
             finished, under_way = wait(under_way, return_when=FIRST_COMPLETED)
             under_way |= {pool.submit(work, *each) for each in itertools.islice(timely, len(finished))}
             yield from (each.result() for each in finished)
-
-
-def _on_cluster(cases: Sequence[Case], how: How, scheduler: str) -> Iterator[dict[str, Any]]:
-    try:
-        from distributed import Client
-        from distributed import as_completed as completed
-    except ImportError as error:
-        raise NoClusterError(NO_DASK) from error
-    try:
-        client = Client(scheduler, timeout="20s")
-    except OSError as error:
-        raise NoClusterError(f"check: no scheduler answers at {scheduler}: {error}") from error
-    with client:
-        waiting = client.map(at_worker, cases, how=how, pure=False)
-        for each in completed(waiting):
-            record = each.result()
-            each.release()
-            yield record
-
-
-def at_worker(case: Case, how: How) -> dict[str, Any]:
-    """Return the record of a case, made on a cluster's worker in a folder of its own.
-
-    Raises NoClusterError where the worker's checkout is not the one that asks.
-    """
-    if fingerprint() != how.code:
-        raise NoClusterError("check: a worker has another state of the code; give all the same checkout")
-    folder, places = _own_folder()
-    return run_case(case, folder, how, places)
-
-
-@functools.cache
-def _own_folder() -> tuple[Path, dict[str, str]]:
-    """Make a folder with all predictions, once a process."""
-    folder = Path(tempfile.mkdtemp(prefix="blind-"))
-    return folder, predictions(folder / "predictions")
 
 
 def say(line: str) -> None:

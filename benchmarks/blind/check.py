@@ -1,10 +1,9 @@
 """How often `diagnose` is right on runs of a robot that it has never seen, and its false alarms.
 
 ``python benchmarks/blind/check.py --cases 200 --seed N`` makes cases with the independent plant of
-``tests/plant``, diagnoses each without its label, and prints the table of metrics, what each test did, the
-confusions and simple methods beside it. ``--full`` is the whole check, ``--full --scale 0.1`` its first
-tenth. Seeds below 30000 are for development and calibration, those from 30000 on are scored; the two never
-mix.
+``tests/plant``, diagnoses each without its label, and prints the table of metrics and the confusions.
+``--full`` is the whole check, ``--full --scale 0.1`` its first tenth. Seeds below 30000 are for development
+and calibration, those from 30000 on are scored; the two never mix.
 """
 
 import argparse
@@ -33,7 +32,6 @@ from blind.cases import (
     SCORED_FROM,
     Case,
     How,
-    NoClusterError,
     done,
     fingerprint,
     fresh_records,
@@ -123,12 +121,7 @@ def _runs(folder: Path, program: Writer, effect: str, size: float) -> float:
     robot = mismatch.of_robot(rng)
     for number in range(3):
         run = simulate(
-            program.waypoints(),
-            World(),
-            [fault.hooks(size)],
-            mismatch.of_day(robot, rng),
-            0.0,
-            number,
+            program.waypoints(), World(), [fault.hooks(size)], mismatch.of_day(robot, rng), 0.0, number
         )
         place = folder / f"run-{number + 1}"
         place.mkdir()
@@ -159,7 +152,6 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--minutes", type=float, default=math.inf, help="begin no case after so long; a later call goes on"
     )
-    parser.add_argument("--scheduler", help="tcp://... of a Dask cluster, instead of processes")
     parser.add_argument("--next", type=int, default=0, metavar="M", help="drive the next run of M cases")
     parser.add_argument(
         "--next-beside", type=int, default=3, metavar="N", help="other programs too on every N-th of these"
@@ -167,10 +159,7 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--resume", type=Path, help="folder that keeps predictions and records, and goes on")
     parser.add_argument("--keep", action="store_true", help="keep the runs of the cases in that folder")
     parser.add_argument("--no-oracle", action="store_true")
-    parser.add_argument(
-        "--baselines", type=int, default=5, metavar="N", help="simple methods on every N-th case; 0: none"
-    )
-    parser.add_argument("--no-baselines", dest="baselines", action="store_const", const=0)
+    parser.add_argument("--no-baselines", action="store_true", help=argparse.SUPPRESS)  # stood in old calls
     parser.add_argument(
         "--decide", action="store_true", help="how far each truth is from its imitators, stored records too"
     )
@@ -221,11 +210,7 @@ def main(given: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.resume or Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
-        try:
-            records, driven = _records(cases, folder, options)
-        except NoClusterError as error:
-            say(str(error))
-            return 2
+        records, driven = _records(cases, folder, options)
         _show(records, driven, options, len(cases), time.perf_counter() - start)
         failures(records, folder)
     return 0
@@ -236,13 +221,13 @@ def _records(
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Return the records of all cases, those already there included, and those of the next runs."""
     until_s = time.monotonic() + 60.0 * options.minutes
-    how = How(not options.no_oracle, options.baselines, options.keep, fingerprint())
+    how = How(not options.no_oracle, options.keep, fingerprint())
     there = [done(case, folder, None if options.only_report else how.code) for case in cases]
     records = [record for record in there if record is not None]
     if not options.only_report:
         left = in_turn([case for case, record in zip(cases, there, strict=True) if record is None])
         say(f"{len(cases)} cases, {len(records)} already there")
-        fresh = fresh_records(left, folder, how, options.jobs, options.scheduler, until_s)
+        fresh = fresh_records(left, folder, how, options.jobs, until_s)
         for i, record in enumerate(fresh):
             store(record, folder)
             records.append(record)

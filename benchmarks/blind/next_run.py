@@ -254,12 +254,7 @@ def drive(
 
 
 def _one_way(
-    way: str,
-    record: dict[str, Any],
-    label: dict[str, Any],
-    truth: Truth,
-    case: Path,
-    places: dict[str, str],
+    way: str, record: dict[str, Any], label: dict[str, Any], truth: Truth, case: Path, places: dict[str, str]
 ) -> dict[str, Any]:
     name, skipped = chosen_program(way, record, truth)
     found: dict[str, Any] = {"way": way, "program": name, "skipped": skipped, "settled": False}

@@ -7,10 +7,6 @@ The label is first put into the words of the library, targets, and names and uni
 and the library are written apart and count some things otherwise. Judged beside the names are where a gap
 sits and on what it depends; the moment of an event, to 20 ms; the stretches of time; and the parameters of a
 right cause.
-
-**Tests.** Which test stopped each wrong name and lost each right one, and what a check without it would have
-named, read from the answers alone. Where a cause has ``tests`` (name -> passed, or an object with
-``passed``), those count; else the contract's figures are compared with the limits here.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -459,115 +455,6 @@ def _inside(times: np.ndarray, spans: Iterable[tuple[float, float]]) -> np.ndarr
     return found
 
 
-FORM_FITS = 0.9
-"""A form that takes less than this of what its family takes is another form."""
-CONSTANT_P = 0.01
-REST_SHARE = 0.05
-"""Share of the gap from which on what is left depends on something."""
-UNLISTED, NO_GAP, UNDECIDED = "not listed", "no gap found", "probability alone"
-
-
-@dataclass(frozen=True)
-class Tested:
-    """The fate of one candidate: whether it was right, whether it was named, and which tests it failed."""
-
-    is_right: bool
-    is_named: bool
-    failed: frozenset[str]
-
-
-def tested_of(result: dict[str, Any], truths: Sequence[Truth]) -> tuple[Tested, ...]:
-    """Return the fate of each named cause, of the first if none is named, and of each truth in any case."""
-    causes = result["causes"]
-    chosen = [cause for cause in causes if cause["probability"] >= NAMED] or causes[:1]
-    absent = 0
-    for truth in truths:
-        right = [cause for cause in causes if declares(cause, truth)]
-        absent += not right
-        if right and not any(cause is each for cause in right for each in chosen):
-            chosen = [*chosen, right[0]]
-    reason = NO_GAP if result["verdict"] == "no_gap" else UNLISTED
-    return (
-        *(
-            Tested(is_among(cause, truths), cause["probability"] >= NAMED, failed_tests(cause, result))
-            for cause in chosen
-        ),
-        *[Tested(True, False, frozenset({reason}))] * absent,
-    )
-
-
-def failed_tests(cause: dict[str, Any], result: dict[str, Any]) -> frozenset[str]:
-    """Return the names of the tests that a cause failed; of one that was not named always at least one."""
-    stated = cause.get("tests")
-    failed = _stated(stated) if _says_passed(stated) else _read(cause, result)
-    if not failed and cause["probability"] < NAMED:
-        failed = {UNDECIDED}
-    return frozenset(failed)
-
-
-def _says_passed(tests: Any) -> bool:
-    """Tell whether tests say what was passed; plain numbers are what a probability is made of."""
-    return bool(tests) and not (isinstance(tests, dict) and any(_is_number(each) for each in tests.values()))
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _stated(tests: Any) -> set[str]:
-    if isinstance(tests, dict):
-        items = list(tests.items())
-    else:
-        items = [(test.get("test") or test.get("name"), test) for test in tests]
-    return {name for name, test in items if not (test["passed"] if isinstance(test, dict) else test)}
-
-
-def _read(cause: dict[str, Any], result: dict[str, Any]) -> set[str]:
-    failed = set()
-    if cause.get("form_fits") is not None and cause["form_fits"] < FORM_FITS:
-        failed.add("form")
-    if cause.get("constant") and cause["constant"]["p"] < CONSTANT_P:
-        failed.add("constancy")
-    rest = [
-        each
-        for each in result["unexplained"].get("depends_on") or ()
-        if each["link"] == cause.get("link") and (each["share"] or 0.0) >= REST_SHARE
-    ]
-    if rest and cause.get("family") and f"{rest[0]['at']}, {rest[0]['on']}" != cause["family"]:
-        failed.add("family")
-    elif rest:
-        failed.add("rest")
-    return failed
-
-
-@dataclass(frozen=True)
-class Ablation:
-    """What one test did: names it stopped and lost, and how many of them no other test would have."""
-
-    test: str
-    wrong_stopped: int
-    wrong_alone: int
-    right_lost: int
-    right_alone: int
-
-
-def ablation(tested: Sequence[Tested]) -> list[Ablation]:
-    """Return a line for each test that failed anywhere; the one that stopped most first."""
-    stopped = [each for each in tested if not each.is_named]
-    rows = [
-        _ablated(test, [each for each in stopped if test in each.failed])
-        for test in sorted({name for each in stopped for name in each.failed})
-    ]
-    return sorted(rows, key=lambda row: -row.wrong_stopped)
-
-
-def _ablated(test: str, stopped: Sequence[Tested]) -> Ablation:
-    wrong = [each for each in stopped if not each.is_right]
-    right = [each for each in stopped if each.is_right]
-    alone = [sum(len(each.failed) == 1 for each in group) for group in (wrong, right)]
-    return Ablation(test, len(wrong), alone[0], len(right), alone[1])
-
-
 UNKNOWN = ("unexplained", "partly_explained")
 NULLS = ("null", "null_foreign_noise", "null_foreign_mismatch")
 VERDICTS = dict.fromkeys(NULLS, ("no_gap",)) | {"open": UNKNOWN, "deleted": UNKNOWN}
@@ -607,7 +494,7 @@ class Judged:
     cpu_s: float = 0.0
     plant_cpu_s: float = 0.0
     beside_cpu_s: float = 0.0
-    """Oracle and simple methods."""
+    """Of the oracle."""
     foreign: tuple[str, ...] = ()
     """Each kind of noise, or the law of the mismatch, that the usual cases do not have."""
     failed: bool = True
@@ -641,13 +528,11 @@ class Judged:
     """Distance of the least decidable effect from its best imitators; None where it is not known."""
     gap_nats: float | None = None
     """The same beside mismatch alone."""
-    tested: tuple[Tested, ...] = ()
     next_program: str | None = None
     shrink: float | None = None
     errors: tuple[float, ...] = ()
     covered: tuple[bool, ...] = ()
     place: Place = Place()
-    baselines: tuple[tuple[str, bool], ...] = ()
 
     @property
     def observable(self) -> bool:
@@ -742,7 +627,6 @@ def judge(record: dict[str, Any]) -> Judged:
         nats=_least(entries, "two"),
         gap_nats=_most(entries, "mismatch"),
         failed=record.get("error") is not None,
-        baselines=_baselines(record, truths),
         **known,
     )
 
@@ -772,7 +656,6 @@ def _answered(
         "in_a_set": bool(right) and covers(causes, right, declares),
         "is_wrongly_named": not all(is_among(cause, right) for cause in named),
         "probabilities": tuple((cause["probability"], is_among(cause, right)) for cause in causes),
-        "tested": tested_of(result, right),
         "has_rest": bool(result["unexplained"].get("significant")),
         "next_program": (result.get("next_run") or {}).get("program"),
         "named_share": sum(any(declares(each, one) for each in named) for one in right) / max(len(right), 1),
@@ -820,12 +703,3 @@ def _relative_shrink(record: dict[str, Any]) -> float | None:
         return None
     gone = gap["rms_before"] ** 2 - gap["rms_after"] ** 2
     return float(np.clip(gone / known["removed"], 0.0, 1.0))
-
-
-def _baselines(record: dict[str, Any], truths: tuple[Truth, ...]) -> tuple[tuple[str, bool], ...]:
-    """Return for each simple method whether it names the truth and nothing else."""
-    right = sorted(truths, key=str)
-    return tuple(
-        (method, sorted(map(tuple, named), key=str) == right)
-        for method, named in (record.get("baselines") or {}).items()
-    )

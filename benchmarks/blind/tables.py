@@ -22,7 +22,7 @@ from blind.figures import (
 )
 from blind.next_run import cost as next_cost
 from blind.next_run import rows as next_rows
-from blind.score import NULLS, Ablation, Judged, ablation
+from blind.score import NULLS, Judged
 
 HALF = (0.35, 0.71)
 """Ratios that count as half the noise."""
@@ -248,16 +248,7 @@ def report(cases: Sequence[Judged], driven: Sequence[dict], title: str) -> str:
     if unknown:
         parts += ["Outside the library and taken out of it, effect >= noise, the worst first:"]
         parts += [_by_unknown(unknown)]
-    parts += ["What the tests did to candidates that were not named (wrong ones stopped, right ones lost;"]
-    parts[-1] += " alone: no other test failed, so that without it they would be named):"
-    parts += [
-        _tests(cases),
-        "Right names lost, effects >= noise, and the tests that they failed:",
-        _lost(cases),
-    ]
     parts += ["Wrong answers, effects >= noise:", _wrong(cases)]
-    if any(each.baselines for each in cases):
-        parts += ["Simple methods on the same cases, exactly right:", _methods(cases)]
     if driven:
         parts += [f"Ambiguity gone after one more run, {len(driven)} cases that were left open:"]
         parts += [table(("one more run", "settled (95 % bound)", "skipped", "aim"), next_rows(driven))]
@@ -320,34 +311,6 @@ def _by_unknown(cases: Sequence[Judged]) -> str:
     return table(head, [row for *_, row in sorted(rows, key=lambda each: each[:2])])
 
 
-def _tests(cases: Sequence[Judged]) -> str:
-    tested = [each for case in cases if case.observable or not case.truths for each in case.tested]
-    rows = [_ablated(each) for each in ablation(tested)]
-    named = [each for each in tested if each.is_named]
-    right = sum(each.is_right for each in named)
-    rows.append(("(named with all tests)", str(len(named) - right), "", str(right), ""))
-    return table(("test", "wrong stopped", "alone", "right lost", "alone"), rows)
-
-
-def _ablated(row: Ablation) -> tuple[str, ...]:
-    numbers = (row.wrong_stopped, row.wrong_alone, row.right_lost, row.right_alone)
-    return (row.test, *map(str, numbers))
-
-
-def _lost(cases: Sequence[Judged]) -> str:
-    """Return each case whose true cause was not named, and which tests it failed."""
-    rows = [
-        (f"{case.kind}-{case.seed:05d}", case.name, case.answer, ", ".join(sorted(each.failed)))
-        for case in cases
-        if case.observable
-        for each in case.tested
-        if each.is_right and not each.is_named
-    ]
-    left = len(rows) - MOST_LINES
-    text = table(("case", "truth", "answer", "failed"), rows[:MOST_LINES]) if rows else "none"
-    return text + (f"\n{left} more" if left > 0 else "")
-
-
 def _wrong(cases: Iterable[Judged]) -> str:
     """Return the confusions: kind, truth and answer, with how often."""
     wrong = [each for each in cases if not each.exact and (each.observable or not each.truths)]
@@ -356,17 +319,6 @@ def _wrong(cases: Iterable[Judged]) -> str:
     text = table(("kind", "truth", "answer", "times"), rows) if rows else "none"
     left = len(found) - MOST_LINES
     return text + (f"\n{left} more, each less often than these" if left > 0 else "")
-
-
-def _methods(cases: Sequence[Judged]) -> str:
-    beside = [each for each in cases if each.baselines]
-    single = [each for each in beside if each.kind == "single" and each.observable]
-    null = [each for each in beside if not each.truths]
-    rows = [("diagnose", _plain(rate(e.exact for e in single)), _plain(rate(not e.named for e in null)))]
-    for method in dict.fromkeys(name for each in beside for name, _ in each.baselines):
-        columns = (_plain(rate(dict(e.baselines)[method] for e in group)) for group in (single, null))
-        rows.append((method, *columns))
-    return table(("method", "effect >= noise", "no effect"), rows)
 
 
 def _time(cases: Sequence[Judged]) -> str:
@@ -386,8 +338,8 @@ def _time(cases: Sequence[Judged]) -> str:
         f"Seconds a case: diagnosis median {np.median(wall):.2f}, worst {wall.max():.2f} (processor "
         f"{np.median(own):.2f}, mean {own.mean():.2f}, worst {own.max():.2f}); plant median "
         f"{np.median(plant):.2f}, worst {plant.max():.2f}.",
-        f"Processor seconds of a case, mean: plant {parts[0]:.2f}, diagnosis {own.mean():.2f}, oracle and "
-        f"simple methods {parts[1]:.2f}: {_share(sum(parts), own.mean())} of a case is not the diagnosis.",
+        f"Processor seconds of a case, mean: plant {parts[0]:.2f}, diagnosis {own.mean():.2f}, oracle "
+        f"{parts[1]:.2f}: {_share(sum(parts), own.mean())} of a case is not the diagnosis.",
         f"At this rate the full check of {sum(full_counts().values())} cases takes {whole_h:.1f} h on two "
         "cores, without the next runs.",
         f"The slowest, processor seconds a case: {', '.join(f'{name} {costs[name]:.0f}' for name in slow)}.",
@@ -420,10 +372,6 @@ def _share(beside_s: float, own_s: float) -> str:
 
 def _count(one: Rate) -> str:
     return f"{one.count}/{one.of}"
-
-
-def _plain(one: Rate) -> str:
-    return f"{one.value:.3f} (n {one.of})" if one.of else "-"
 
 
 def _short(values: Iterable[float | None]) -> str:

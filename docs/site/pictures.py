@@ -49,11 +49,8 @@ def draw(folder: Path) -> dict[str, Path]:
 
 
 def _long(folder: Path) -> list[Path]:
-    """Draw the pictures of the long program as ``docs/long_pictures.py`` does."""
-    drawn = folder / "p"
-    _run("examples/make_examples.py", "--out", str(folder), "--pocket")
-    program, cell = folder / "adaptive_pocket.nc", folder / "cell.toml"
-    _tool("predict", str(program), "--cell", str(cell), "-o", str(drawn), "--plot", "--quiet")
+    """Draw the pictures of the long program."""
+    drawn = long_pictures.predict(folder)
     targets = [folder / f"long_{name}.png" for name in long_pictures.PICTURES]
     for name, target in zip(long_pictures.PICTURES, targets, strict=True):
         long_pictures.shrink(drawn / f"{name}.png", target)
@@ -65,15 +62,12 @@ def _png(folder: Path, name: str) -> Path:
 
 
 def _tool(*words: str) -> None:
-    """Run the tool of this tree."""
-    _run("-m", "gcode2krl", *words)
-
-
-def _run(*words: str) -> None:
-    """Run Python; what it says is shown only where it fails."""
-    done = subprocess.run([sys.executable, *words], cwd=ROOT, capture_output=True, text=True)
+    """Run the tool of this tree; what it says is shown only where it fails."""
+    done = subprocess.run(
+        [sys.executable, "-m", "gcode2krl", *words], cwd=ROOT, capture_output=True, text=True
+    )
     if done.returncode != 0:
-        raise RuntimeError(f"python {' '.join(words)}\n{done.stderr}")
+        raise RuntimeError(f"gcode2krl {' '.join(words)}\n{done.stderr}")
 
 
 def main() -> None:

@@ -268,7 +268,7 @@ class Cell(Section):
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
         known = self.external
-        return np.array([known[name].rest() if name in known else 0.0 for name in EXTERNAL_NAMES])
+        return np.array([known[name].resting_place() if name in known else 0.0 for name in EXTERNAL_NAMES])
 
     def tool_matrix(self, number: int) -> Floats:
         """Return the tool frame (4, 4) in the flange whose z points from tip to holder.

@@ -13,6 +13,7 @@ from typing import Any
 
 from gcode2krl.cell.definition import Cell, as_toml
 from gcode2krl.cell.descriptions import NOT_OF_A_FILE
+from gcode2krl.files.there import is_there
 
 Values = dict[str, dict[str, Any]]
 """Section (``frames``, ``tool.1``, ``m_code``) → dotted key → plain value."""
@@ -75,7 +76,7 @@ def _wherever_it_lies(key: str, value: Any) -> Any:
     if not isinstance(value, str) or not _NAMES_FILE.search(key) or not Path(value).is_absolute():
         return value
     file = Path(value)
-    if key.endswith(".model") or not file.is_file():  # the values of a model stand in its section
+    if key.endswith(".model") or not is_there(file):  # the values of a model stand in its section
         return file.name
     with file.open("rb") as stream:
         return f"{file.name} {hashlib.file_digest(stream, 'sha256').hexdigest()[:_HASH_DIGITS]}"

@@ -17,6 +17,7 @@ from gcode2krl.cell.descriptions import NOT_OF_A_FILE, sections_in
 from gcode2krl.cell.key_lines import with_lines
 from gcode2krl.codes import closest
 from gcode2krl.errors import Issue, NotUnderstoodError
+from gcode2krl.files.there import is_there
 
 # The key of a cell that a mistyped one most likely means: the closest key of its section.
 
@@ -104,8 +105,8 @@ def _obstacle_issues(cell: Cell) -> Iterator[Issue]:
         if obstacle.name in names:
             yield key_issue(f"obstacle.{number}.name", f"{obstacle.name!r} names two obstacles")
         names.add(obstacle.name)
-        if obstacle.mesh is not None and not Path(obstacle.mesh).is_file():
-            words = f"there is no file {Path(obstacle.mesh).name!r}"
+        if obstacle.mesh is not None and not is_there(obstacle.mesh):
+            words = f"there is no file {Path(obstacle.mesh).name[:80]!r}"
             yield key_issue(f"obstacle.{number}.mesh", words, "give its path relative to the cell file")
 
 

@@ -70,20 +70,15 @@ class _Commands(CommandsOnUse):
 
 def _refuse_mistyped(word: str) -> None:
     """Raise if a first word is neither a command nor a part: no option, no ending, no such file."""
-    if word.startswith("-") or Path(word).suffix or _is_there(word):
+    from gcode2krl.files.there import is_there
+
+    if word.startswith("-") or Path(word).suffix or is_there(word, Path.exists):
         return
     near = closest(word.lower(), _COMMANDS)
     if near:
         sentence = f"no command {word!r}: did you mean {near!r}?"
         raise input_error("command-unknown", sentence, "`gcode2krl --help` lists the commands")
     raise input_error("file-unreadable", f"no such file {word!r}", "`gcode2krl --help` lists the commands")
-
-
-def _is_there(word: str) -> bool:
-    try:
-        return Path(word).exists()
-    except OSError:  # a name that is too long for a file
-        return False
 
 
 @click.command(

@@ -38,9 +38,9 @@ def compared(prediction: "Prediction", nominal: str) -> "Comparison":
     if motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
     removal = remove(prediction.toolpath, motion, cell, is_checked=False)
-    if isinstance(removal.left, HeightField):
+    if isinstance(removal.material, HeightField):
         return compare(removal, motion, mesh)
-    return compare_turned(removal.left, motion, cell, mesh, _nearest_on)
+    return compare_turned(removal.material, motion, cell, mesh, _nearest_on)
 
 
 def _nearest_on(mesh: "trimesh.Trimesh", places_mm: "Floats") -> "Floats":

@@ -229,7 +229,7 @@ def _save_part(prediction: "Prediction", file: Path, inputs: list[Path]) -> Path
 
     if prediction.motion is None:
         raise AssertionError("predict_toolpath always plans a motion")
-    part = remove(prediction.toolpath, prediction.motion, prediction.cell).left
+    part = remove(prediction.toolpath, prediction.motion, prediction.cell).material
     mesh = to_mesh(part) if isinstance(part, HeightField) else dexels_to_mesh(part)
     content = mesh.export(file_type=file.suffix.lower().removeprefix("."))
     write_together({file: content.encode("utf-8") if isinstance(content, str) else bytes(content)}, inputs)

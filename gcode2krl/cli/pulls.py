@@ -19,7 +19,7 @@ KEYS = ("k_Nmm_rad", "level", "relative_band")
 RIGID = 9.9e99
 LUMPED_BAND = 0.35
 """Half-width of the band of an arm whose links and bearings are taken as springs of its axes: what
-`benchmarks/identify_pulls.py` finds at poses that were not measured."""
+was measured once at poses that the fit had not seen."""
 
 
 def write_form(

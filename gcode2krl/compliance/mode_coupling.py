@@ -13,7 +13,7 @@ Sources, known from their abstracts: Pan, Zhang, Zhu & Wang 2006 (Chatter analys
 process): K - Kp of an arm; Cen & Melkote 2017 (CCT-based mode coupling chatter avoidance in robotic milling):
 choice of the pose; Mousavi, Gagnol, Bouzgarrou & Ray 2018 (Stability optimization in robotic milling through
 the control of functional redundancies): choice of the turn about the tool axis. The equations here follow
-from the balance of forces; `benchmarks/mode_coupling.py` holds them against a simulation in time.
+from the balance of forces; `tests/pose/two_modes.py` holds them against a simulation in time.
 
 Left out: regeneration (`cutting.lobes`), mass that differs with direction, damping other than `DAMPING`, the
 part of the force that follows the tip's velocity, the bending of spindle and tool themselves.

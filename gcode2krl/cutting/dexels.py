@@ -32,7 +32,7 @@ SIDE = 4
 MOST = 32
 """Stretches of material that a ray may have."""
 CELLS_PER_DIAMETER = 32.0
-"""Default resolution: 0.5 mm for a cutter of 16 mm. `benchmarks/five_axis.py` prints what it costs."""
+"""Default resolution: 0.5 mm for a cutter of 16 mm. docs/cutting.md says what it costs."""
 MAX_RAYS = 8_000_000
 SHORTENED = 127
 """Length of a packed normal."""

@@ -22,7 +22,7 @@ _first_contact = core_function("cutting_first_contact", DEXELS, TURNED, OUT_FLOA
 
 
 def depth_in_material(
-    left: HeightField | Dexels, to_field: Floats, tip_mm: Floats, axis: Floats, tool: Tool, slack_mm: float
+    stock: HeightField | Dexels, to_field: Floats, tip_mm: Floats, axis: Floats, tool: Tool, slack_mm: float
 ) -> float:
     """Return how deep in mm a tool with its tip at a place (3,) in ``$BASE`` is in material.
 
@@ -30,36 +30,36 @@ def depth_in_material(
     height field the way down the tool axis is free where its end is, as it has no undercuts; of dexels it is
     the smallest of the longest stretches that the tool takes along x, y and z.
     """
-    if isinstance(left, HeightField):
-        within = 2.0 * (slack_mm + float(left.cell_mm.max()))
+    if isinstance(stock, HeightField):
+        within = 2.0 * (slack_mm + float(stock.cell_mm.max()))
         smaller = max(tool.diameter_mm - within, 0.1 * tool.diameter_mm)
         inner = tool.model_copy(update={"diameter_mm": smaller})
-        return standing_mm(left, to_field @ tip_mm + np.array([0.0, 0.0, slack_mm]), inner)
-    within = slack_mm + _FINE_CELLS * float(left.cell_mm.max())
+        return standing_mm(stock, to_field @ tip_mm + np.array([0.0, 0.0, slack_mm]), inner)
+    within = slack_mm + _FINE_CELLS * float(stock.cell_mm.max())
     above = tip_mm + within * axis
-    removed_mm = _met(left, np.array([above + _STANDS_MM * axis, above]), axis, tool, -within)[1]
+    removed_mm = _met(stock, np.array([above + _STANDS_MM * axis, above]), axis, tool, -within)[1]
     return float(removed_mm.min())
 
 
 def free_above_mm(
-    left: HeightField | Dexels, to_field: Floats, tip_mm: Floats, axis: Floats, tool: Tool, above_mm: float
+    stock: HeightField | Dexels, to_field: Floats, tip_mm: Floats, axis: Floats, tool: Tool, above_mm: float
 ) -> float:
     """Return how far above a tip (3,), along its axis, no material is below the tool or near it.
 
     Dexels are asked from ``above_mm`` downwards.
     """
-    if isinstance(left, HeightField):
+    if isinstance(stock, HeightField):
         x, y, z = to_field @ tip_mm
         reach = tool.diameter_mm / 2.0 + _AROUND_MM
-        (j0, j1), (i0, i1) = (left.cells(k, at - reach, at + reach) for k, at in enumerate((x, y)))
-        part = left.height_mm[i0 : i1 + 1, j0 : j1 + 1]
-        return float(max(part.max(initial=-np.inf), left.bottom_mm) - z)
+        (j0, j1), (i0, i1) = (stock.cells(k, at - reach, at + reach) for k, at in enumerate((x, y)))
+        part = stock.height_mm[i0 : i1 + 1, j0 : j1 + 1]
+        return float(max(part.max(initial=-np.inf), stock.bottom_mm) - z)
     height_mm = np.append(np.arange(above_mm, 0.0, -_STEP_MM), 0.0)
-    met, _ = _met(left, tip_mm + height_mm[:, None] * axis, axis, tool, _AROUND_MM)
+    met, _ = _met(stock, tip_mm + height_mm[:, None] * axis, axis, tool, _AROUND_MM)
     return float(height_mm[met - 1]) if met < len(height_mm) else 0.0
 
 
-def _met(left: Dexels, tip_mm: Floats, axis: Floats, tool: Tool, wider_mm: float) -> tuple[int, Floats]:
+def _met(stock: Dexels, tip_mm: Floats, axis: Floats, tool: Tool, wider_mm: float) -> tuple[int, Floats]:
     """Return at which of tips (n, 3) a tool made wider meets material, n for none, and what it takes (3,)."""
     bottom, corner, sine, cosine, radius, top = body_of(tool)
     round_off = min(bottom + wider_mm, 0.0)  # of a ball that becomes smaller
@@ -81,4 +81,4 @@ def _met(left: Dexels, tip_mm: Floats, axis: Floats, tool: Tool, wider_mm: float
         longest_mm=longest_step(bodies),
     )
     removed_mm = np.zeros(3)
-    return int(_first_contact(left.copy(), points, removed_mm)), removed_mm
+    return int(_first_contact(stock.copy(), points, removed_mm)), removed_mm

@@ -46,7 +46,7 @@ class Stretches:
 
     def __init__(self) -> None:
         """Begin in front of the first sample."""
-        self.found: list[Stretch] = []
+        self.listed: list[Stretch] = []
         self._goes_on = False
         self._is_listed = False
 
@@ -54,12 +54,12 @@ class Stretches:
         """Judge the next samples (m, at least one) from whether they are wrong, line, tool and value."""
         if self._goes_on and self._is_listed and wrong[0] and values is not None:
             worst = float(values[: _end(wrong, 0)].max())
-            self.found[-1] = self.found[-1]._replace(worst=max(self.found[-1].worst, worst))
+            self.listed[-1] = self.listed[-1]._replace(worst=max(self.listed[-1].worst, worst))
         begins = np.flatnonzero(wrong & ~np.concatenate([[self._goes_on], wrong[:-1]]))
-        room = MOST_PLACES - len(self.found)
+        room = MOST_PLACES - len(self.listed)
         for row in begins[:room].tolist():
             worst = float(values[row : _end(wrong, row)].max()) if values is not None else 0.0
-            self.found.append(Stretch(int(line[row]), int(tool[row]), worst))
+            self.listed.append(Stretch(int(line[row]), int(tool[row]), worst))
         if len(begins):
             self._is_listed = len(begins) <= room
         self._goes_on = bool(wrong[-1])
@@ -107,7 +107,7 @@ class RapidContacts:
         kept = (known.row >= settled) | (known.depth_mm > CONTACT_MM)
         self._rows = taken(known, kept)
 
-    def found(self) -> list[Stretch]:
+    def stretches(self) -> list[Stretch]:
         """Return the stretches in which a rapid meets more than the rest of a rounded corner."""
         met = self._rows.depth_mm > CONTACT_MM
         rows = taken(self._rows, met)
@@ -275,13 +275,13 @@ class Findings:
 
     def _found(self, code: str, number: int = 0) -> list[Stretch]:
         stretches = self._wrong.get((code, number))
-        return stretches.found if stretches is not None else []
+        return stretches.listed if stretches is not None else []
 
     def _collisions(self) -> Iterator[Issue]:
         kinds = (
             (
                 "rapid-in-stock",
-                self._rapids.found(),
+                self._rapids.stretches(),
                 "rapid move through material, {depth:.2f} mm deep",
                 "retract first, or use G1",
             ),

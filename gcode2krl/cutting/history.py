@@ -64,7 +64,7 @@ def history_of(
     NotUnderstoodError
         Where the stock cannot be read.
     """
-    outlook = outlook_of([motion]).on(toolpath.restart.left if toolpath.restart is not None else None)
+    outlook = outlook_of([motion]).on(toolpath.restart.material if toolpath.restart is not None else None)
     if outlook.turns:
         slots, most = (_SHORTEST_S, 1.0 / _SLOTS), (most_blocks, most_events)
         return surface_history(toolpath, motion, cell, outlook, slots, most)

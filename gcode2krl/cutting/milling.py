@@ -154,7 +154,7 @@ class Removal:
     """The result of `remove`."""
 
     forces: Forces
-    left: HeightField | Dexels
+    material: HeightField | Dexels
     """The material that is left; dexels where the tool axis turns."""
     to_field: Floats
     """(3, 3) rotation from ``$BASE`` to its frame."""
@@ -544,7 +544,7 @@ def raw_material(toolpath: Toolpath, motion: Motion, cell: Cell) -> HeightField 
 
 def _left_before(toolpath: Toolpath) -> object:
     """Return what the lines before a restart have left."""
-    return toolpath.restart.left if toolpath.restart is not None else None
+    return toolpath.restart.material if toolpath.restart is not None else None
 
 
 def _largest_cdis(toolpath: Toolpath, cell: Cell) -> float:

@@ -77,7 +77,7 @@ def compare(removal: Removal, motion: Motion, nominal: "trimesh.Trimesh") -> Com
     turn = np.eye(4)
     turn[:3, :3] = removal.to_field
     wanted = mesh_of(solid_of(nominal)).apply_transform(turn)
-    part = removal.left
+    part = removal.material
     assert isinstance(part, HeightField), "of dexels see nominal_turned"
     have, want = _heights(part, wanted)
     differences: list[Difference] = []

@@ -31,9 +31,9 @@ class Outlook:
     turns: bool = False
     """True where the tool axis changes: one height field cannot hold what is cut."""
 
-    def on(self, left: object) -> "Outlook":
+    def on(self, material: object) -> "Outlook":
         """Return what is needed to go on with what lines before have left: where those are dexels, dexels."""
-        return replace(self, to_field=np.eye(3), turns=True) if isinstance(left, Dexels) else self
+        return replace(self, to_field=np.eye(3), turns=True) if isinstance(material, Dexels) else self
 
 
 class Watch:

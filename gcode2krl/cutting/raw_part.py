@@ -21,6 +21,7 @@ from gcode2krl.cutting.height_field import CELLS_PER_DIAMETER, MAX_CELLS, Height
 from gcode2krl.cutting.mesh_file import REMEDY, MeshError, read_mesh_file
 from gcode2krl.cutting.solids import mesh_of, solid_of
 from gcode2krl.errors import extra_missing, input_error
+from gcode2krl.files.there import is_there
 from gcode2krl.tables import Toolpath
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def height_field_of(toolpath: Toolpath, cell: Cell, to_field: Floats, tools: lis
     NotUnderstoodError
         Where a mesh cannot be read or the field would be too large.
     """
-    left_over = toolpath.restart.left if toolpath.restart is not None else None
+    left_over = toolpath.restart.material if toolpath.restart is not None else None
     if isinstance(left_over, HeightField):
         return left_over.copy()
     stock = cell.stock
@@ -78,7 +79,7 @@ def dexels_of(
     Cells are so large that at most so many squares of theirs cover the box around it.
     """
     stock, smallest_mm = cell.stock, min(tool.diameter_mm for tool in tools)
-    left_over = toolpath.restart.left if toolpath.restart is not None else None
+    left_over = toolpath.restart.material if toolpath.restart is not None else None
     if isinstance(left_over, Dexels):
         is_stated = stock is not None and (stock.mesh is not None or stock.box_mm is not None)
         cell_mm = float(left_over.cell_mm.max())
@@ -125,10 +126,9 @@ def load_mesh(file: Path, what: str = "stock") -> "trimesh.Trimesh":
     Cracks are closed (`solids.solid_of`). Raises `NotUnderstoodError` where the file is missing, not a mesh,
     has holes or is not in mm, or where it is a 3MF file and the extra for them is not installed.
     """
-    if not file.is_file():
-        raise input_error(
-            "file-unreadable", f"cannot read the {what}: no such file", REMEDY, source=str(file)
-        )
+    if not is_there(file):
+        words = f"cannot read the {what}: no such file"
+        raise input_error("file-unreadable", words, REMEDY, source=str(file))
     try:
         data, kind = read_mesh_file(file)
         if kind == "3mf" and not all(map(find_spec, _NEEDED_FOR_3MF)):

@@ -33,7 +33,7 @@ class Surface(NamedTuple):
     """Packed normal of what was cut in a cube."""
     point: Ints32
     """The point of the path that cut it, -1 where none did,"""
-    left: Ints32
+    shape_left: Ints32
     """and the shape that it left."""
 
 
@@ -174,7 +174,7 @@ def _begun(raw: Dexels) -> tuple[Surface, _Events, _Events]:
         shape=np.zeros(cubes, np.int32),
         facing=np.zeros(cubes, np.int32),
         point=np.full(cubes, -1, np.int32),
-        left=np.zeros(cubes, np.int32),
+        shape_left=np.zeros(cubes, np.int32),
     )
     room = max(cubes, 100_000)
     events = _Events(*(np.empty(room, np.int32) for _ in _Events._fields))

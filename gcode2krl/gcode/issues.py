@@ -34,6 +34,11 @@ Record = Any
 
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 _LETTER_O = re.compile(r"[A-MP-Z]\s*[-+]?[\d.]*O[\d.]*")
+_NAME_OR_EXPRESSION = re.compile(r"\[[^\]]*\]|<[^>]*>")
+_LETTERS_WITH_O = re.compile(r"[A-Z]O[A-Z]")
+_JUMP = re.compile(r"GOTO|POPEN")
+_ALONE = re.compile(r"(?<![A-Z])([A-MP-Z])\s*(?=[A-Z])")
+"""A letter that another one follows."""
 _MACRO_STATEMENT = re.compile(r"[A-Z]O[A-Z]|(?:^|\])\s*(?:N\d+\s*)?DO\s*\d")
 """GOTO, POPEN, DO1: statements of a macro."""
 _EXPONENT = re.compile(r"[\d.]E[-+]?\d")
@@ -128,6 +133,9 @@ def found_issues(
 def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     number, line = int(row["number"]), int(row["line"])
     a, b, c = (float(row[name]) for name in "abc")
+    if number == findings.F.O_WORD and a == findings.PF.FAULT_NOT_FIRST:
+        letter = _letter_of_a_word(texts.get(line, b""))
+        number, a = (int(findings.F.NO_NUMBER), float(ord(letter))) if letter else (number, a)
     excerpt = quote(texts[line], number, a, b, c) if line in texts else ""
     issue = sentences.make_issue(number, line, a, b, c, excerpt)
     if excerpt:
@@ -136,6 +144,15 @@ def _issue(row: Record, texts: Mapping[int, bytes]) -> Issue:
     may_slip = line in texts and not (number == findings.F.O_WORD and _O_LINE.match(texts[line]))
     usual = _slip(texts[line], issue.code, letter) if may_slip else None
     return replace(issue, message=usual[0], remedy=usual[1]) if usual else issue
+
+
+def _letter_of_a_word(block: bytes) -> str:
+    """Return the first letter without a number where the O stands in a word, as FOO; else ''."""
+    text = _NAME_OR_EXPRESSION.sub("", _COMMENT.sub(" ", block.decode("latin-1"))).upper()
+    if not _LETTERS_WITH_O.search(text) or _JUMP.search(text):
+        return ""
+    letter = _ALONE.search(text)
+    return letter[1] if letter else ""
 
 
 def _of_all_misfits(issue: Issue, row: Record, lines: list[int], state: Record) -> Issue:

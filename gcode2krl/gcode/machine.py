@@ -24,7 +24,7 @@ MACHINE = StructOf(
     counts=ArrayOf(COUNTS, written=True),
     rows=ROWS,
     events=ArrayOf(EVENT, written=True),
-    found=ArrayOf(FOUND, written=True),
+    raised=ArrayOf(FOUND, written=True),
     saved=ArrayOf(MODES, written=True),
     offsets=OUT_FLOATS,
     offset_known=OUT_BOOLS,

@@ -371,7 +371,7 @@ class _Interpreter:
             counts=self.counts,
             rows=self.columns.views(),
             events=self.events,
-            found=self.raised,
+            raised=self.raised,
             saved=np.zeros(FRAMES, MODES),
             **spoken.settings(),
             group_of_g=GROUP_OF_G,

@@ -44,7 +44,7 @@ def touching_of(prediction: Prediction) -> Touching | None:
     axis = tool_axes(motion)
     if np.abs(axis - axis[:1]).max(initial=0.0) < 1e-6:
         return None
-    part = remove(prediction.toolpath, motion, cell, is_checked=False).left
+    part = remove(prediction.toolpath, motion, cell, is_checked=False).material
     if not isinstance(part, Dexels):
         return None
     velocity, swing = (np.gradient(each, motion.time_s, axis=0) for each in (motion.position_mm, axis))

@@ -247,9 +247,9 @@ class Longest(NamedTuple):
 
 def longest(vectors: Floats) -> Longest:
     """Return the longest of vectors (m, 3)."""
-    found = np.empty(2)
-    row = _find_longest(np.ascontiguousarray(vectors), found)
-    return Longest(row, float(found[0]), bool(found[1]))
+    size = np.empty(2)
+    row = _find_longest(np.ascontiguousarray(vectors), size)
+    return Longest(row, float(size[0]), bool(size[1]))
 
 
 def _absurd_forces(tool: int, line: int) -> Issue:

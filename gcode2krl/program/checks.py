@@ -1,6 +1,6 @@
 """Checks that refuse a program from the G-code and the cell alone (no robot, no material)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -27,10 +27,15 @@ def lacks_geometry(toolpath: Toolpath, cell: Cell) -> bool:
     return any(_geometry_keys(toolpath, cell))
 
 
-def missing_issues(toolpath: Toolpath, cell: Cell) -> list[Issue]:
-    """Return an error for each key that the program needs and the cell does not state."""
-    keys = [*_geometry_keys(toolpath, cell), *_other_keys(toolpath, cell)]
-    return [missing_key(key, reason) for key, reason in dict(keys).items()]
+def missing_issues(toolpath: Toolpath, cell: Cell, but: Sequence[int] = ()) -> list[Issue]:
+    """Return an error for each key that the program needs and the cell does not state.
+
+    ``but``: tools whose missing length is told otherwise.
+    """
+    keys = dict([*_geometry_keys(toolpath, cell), *_other_keys(toolpath, cell)])
+    for number in but:
+        keys.pop(f"tool.{number}.length_mm", None)
+    return [missing_key(key, reason) for key, reason in keys.items()]
 
 
 def doubtful_issues(toolpath: Toolpath, cell: Cell) -> Iterator[Issue]:
@@ -171,7 +176,7 @@ def check_toolpath(toolpath: Toolpath, cell: Cell) -> tuple[Issue, ...]:
     for check in (_undefined_positions, _machine_moves, _spindle, _speeds, _length_offsets, _clearance):
         findings += list(check(toolpath, cell, feed))
     findings += list(_tools(toolpath, cell, feed))
-    findings += missing_issues(toolpath, cell)
+    findings += missing_issues(toolpath, cell, but=_without_length(toolpath, cell))
     findings += doubtful_issues(toolpath, cell)
     findings += list(_events(toolpath, cell))
     findings += list(_silent_changes(toolpath, cell))
@@ -441,7 +446,7 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
                 "library, or from this program's comments where they name them (--tools LIBRARY: one call); "
                 f"or write [tool.{number}] with diameter_mm, teeth and length_mm, or tool_data",
             )
-        elif cell.tool[number].length_mm is None and cell.tool[number].frame is None:
+        elif number in _without_length(toolpath, cell):
             yield Issue(
                 "error",
                 "tool-unknown",
@@ -449,6 +454,12 @@ def _tools(toolpath: Toolpath, cell: Cell, feed: Bools) -> Iterator[Issue]:
                 f"T{number} has no length and no frame in the cell",
                 f"give tool.{number}.length_mm",
             )
+
+
+def _without_length(toolpath: Toolpath, cell: Cell) -> list[int]:
+    """Return the tools of the cell that move and have neither a length nor a frame."""
+    tools = [(number, cell.tool[number]) for number in used_tools(toolpath) if number in cell.tool]
+    return [number for number, tool in tools if tool.length_mm is None and tool.frame is None]
 
 
 def _first_change(toolpath: Toolpath) -> int:

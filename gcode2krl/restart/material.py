@@ -39,7 +39,7 @@ class _Before:
     """The whole program, and what the lines before the restart have left."""
 
     plan: Plan
-    left: HeightField | Dexels | None
+    material: HeightField | Dexels | None
     """Dexels where the tool axis turns anywhere in the program."""
     to_field: Floats
     """(3, 3) from ``$BASE`` to the frame of the field."""
@@ -71,7 +71,7 @@ def restarted(toolpath: Toolpath, line: int, cell: Cell, tolerance_mm: float | N
     if first != row:
         issues.append(_one_before(toolpath, row, first))
     begins = int(toolpath.source_line[first])
-    restart = Restart(line=line, begins_line=begins, left=before.left)
+    restart = Restart(line=line, begins_line=begins, material=before.material)
     begun = begun_at(toolpath, first, restart, _way(before, first, cell))
     issues += _other_arm(before, begun, cell, tolerance_mm)
     return replace(begun, issues=(*begun.issues, *issues))
@@ -88,7 +88,7 @@ def _before(
     plan = prepare(toolpath, cell, tolerance_mm)
     try:
         motion = plan_motion(plan.targets, cell, cell.controller.cycle_s, watches=False)
-        known = Restart(line=0, begins_line=0, left=cutting.raw_material(toolpath, motion, cell))
+        known = Restart(line=0, begins_line=0, material=cutting.raw_material(toolpath, motion, cell))
         done = _until(motion, krc4.build_chain(plan.targets, cell), row)
         removal = cutting.remove(replace(toolpath, restart=known), done, cell)
     except Gcode2KrlError as error:
@@ -99,7 +99,7 @@ def _before(
         return _Before(plan, None, np.eye(3)), [issue]
     # a rapid has removed what it met, so what is below it would count as cut
     collisions = [issue for issue in removal.forces.issues if issue.code == _UNTRUE]
-    return _Before(plan, removal.left, removal.to_field), collisions
+    return _Before(plan, removal.material, removal.to_field), collisions
 
 
 def _until(motion: Motion, chain: krc4.Chain, row: int) -> Motion:
@@ -173,14 +173,14 @@ def _first_row(before: _Before, row: int, cell: Cell) -> int:
 def _depth_mm(before: _Before, row: int, cell: Cell) -> float:
     """Return how deep in material the tool stands at the start of a row; of a rapid 0, as its end counts."""
     at = approached_row(before.toolpath, row)
-    if before.left is None or at == row:
+    if before.material is None or at == row:
         return 0.0
     ends = np.flatnonzero(before.plan.targets.move == at)
     cdis_mm = float(before.plan.targets.cdis_mm[ends[-1]]) if len(ends) else 0.0
     slack_mm = min(0.5 * cdis_mm, _MOST_OF_CORNER_MM)  # no corner is off by more than half of CDIS
     tool = cell.tool[_tool(before, row)]
     tip_mm, axis = before.toolpath.position_mm[at], before.toolpath.axis[at]
-    return cutting.depth_in_material(before.left, before.to_field, tip_mm, axis, tool, slack_mm)
+    return cutting.depth_in_material(before.material, before.to_field, tip_mm, axis, tool, slack_mm)
 
 
 def _tool(before: _Before, row: int) -> int:
@@ -221,9 +221,9 @@ def _way(before: _Before, row: int, cell: Cell) -> Floats:
     heights = [above_mm]
     if at != row:
         entry_mm = above_mm
-        if before.left is not None:
+        if before.material is not None:
             tool = cell.tool[_tool(before, row)]
-            free_mm = cutting.free_above_mm(before.left, before.to_field, end, axis, tool, above_mm)
+            free_mm = cutting.free_above_mm(before.material, before.to_field, end, axis, tool, above_mm)
             entry_mm = max(free_mm, 0.0) + ENTRY_MM
         heights += [entry_mm, 0.0] if entry_mm < above_mm else [0.0]
     return np.asarray(end + np.outer(heights, axis))
@@ -236,8 +236,8 @@ def _safe_height(before: _Before, cell: Cell) -> float:
     heights = [float(toolpath.position_mm[rapids, 2].max(initial=-np.inf))]
     if cell.clearance_z_mm is not None:
         heights.append(cell.clearance_z_mm)
-    if before.left is not None:
-        heights.append(_top(before.left, before.to_field) + ABOVE_STOCK_MM)
+    if before.material is not None:
+        heights.append(_top(before.material, before.to_field) + ABOVE_STOCK_MM)
     return max(heights)
 
 

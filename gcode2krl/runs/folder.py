@@ -14,6 +14,7 @@ from gcode2krl.cell import load_cell
 from gcode2krl.errors import Issue, NotUnderstoodError, input_error
 from gcode2krl.exchange.findings import counted, findings_block
 from gcode2krl.exchange.html import block, text_table
+from gcode2krl.files.there import is_there
 from gcode2krl.runs import matching
 from gcode2krl.runs.controller_trace import resolution_mm
 from gcode2krl.runs.diadem import is_data_set
@@ -382,7 +383,7 @@ def load_run(folder: str | Path, *, partial: bool = False) -> Run:
     6
     """
     place = Path(folder)
-    if not place.is_dir():
+    if not is_there(place, Path.is_dir):
         raise input_error(
             "file-unreadable", "is not a folder", "a run is a folder with run.toml", source=str(place)
         )
@@ -452,7 +453,7 @@ def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
     """Return the file of a table: the one that ``[files]`` names, else the usual one, else None."""
     named: str | None = getattr(head.files, what)
     if named is not None:
-        if not _exists(place / named):
+        if not is_there(place / named):
             words = f"files.{what}: no file {named[:80]!r} there"
             raise input_error("file-unreadable", words, source=str(place / "run.toml"))
         return place / named
@@ -465,14 +466,6 @@ def _file_of(what: What, place: Path, head: RunHead) -> Path | None:
         remedy = f"keep one, or name it: [files] {what} = {files[0].name!r}"
         raise input_error("run-files", f"{what}: several files: {names}", remedy, source=str(place))
     return files[0] if files else None
-
-
-def _exists(path: Path, is_file: bool = True) -> bool:
-    """Tell whether a path leads to a file (or anything); an invalid name leads nowhere."""
-    try:
-        return path.is_file() if is_file else path.exists()
-    except (OSError, ValueError):
-        return False
 
 
 def _controller_logs(place: Path) -> list[Path]:
@@ -495,7 +488,7 @@ def _not_read(place: Path, controller: Path | None) -> list[Issue]:
 
 def _gear_ratio(place: Path, head: RunHead) -> tuple[float, ...] | None:
     """Return the gear ratios of the cell that ``run.toml`` names."""
-    if head.cell is None or not _exists(place / head.cell):
+    if head.cell is None or not is_there(place / head.cell):
         return None
     return load_cell(place / head.cell).robot.drives.gear_ratio
 
@@ -512,5 +505,5 @@ def _paths(place: Path, head: RunHead) -> list[Issue]:
             "relative to the run's folder",
         )
         for key, value in named.items()
-        if value is not None and not _exists(place / value, is_file=False)
+        if value is not None and not is_there(place / value, Path.exists)
     ]

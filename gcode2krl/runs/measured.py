@@ -30,7 +30,7 @@ class Signal(NamedTuple):
     name: str
     columns: tuple[str, ...]
     factor: float = 1.0
-    each: bool = False
+    one_by_one: bool = False
     """Columns may be missing one by one (a joint without encoder)."""
     joints: bool = False
     """A joint may be missing if only some joints are required."""
@@ -173,7 +173,7 @@ class Poses(Measured):
 ABC_CMD, ABC = ("a_cmd_deg", "b_cmd_deg", "c_cmd_deg"), ("a_deg", "b_deg", "c_deg")
 XYZ = ("x_mm", "y_mm", "z_mm")
 TEMPERATURES = (
-    Signal("temperature_C", tuple(f"temp{n}_C" for n in range(1, 9)), each=True, gaps=True, some=True),
+    Signal("temperature_C", tuple(f"temp{n}_C" for n in range(1, 9)), one_by_one=True, gaps=True, some=True),
     Signal("ambient_C", ("ambient_C",), gaps=True),
 )
 SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
@@ -182,14 +182,14 @@ SIGNALS: dict[type[Measured], tuple[Signal, ...]] = {
         Signal("abc_cmd_rad", ABC_CMD, RAD_PER_DEG),
         Signal("q_cmd_rad", _six("q{}_cmd_deg"), RAD_PER_DEG, joints=True),
         Signal("q_act_rad", _six("q{}_act_deg"), RAD_PER_DEG, joints=True),
-        Signal("q_load_rad", _six("q{}_load_deg"), RAD_PER_DEG, each=True),
-        Signal("current_A", _six("i{}_A"), each=True),
-        Signal("torque_Nmm", _six("tau{}_Nm"), MM_PER_M, each=True),
+        Signal("q_load_rad", _six("q{}_load_deg"), RAD_PER_DEG, one_by_one=True),
+        Signal("current_A", _six("i{}_A"), one_by_one=True),
+        Signal("torque_Nmm", _six("tau{}_Nm"), MM_PER_M, one_by_one=True),
         Signal("position_act_mm", ("x_act_mm", "y_act_mm", "z_act_mm")),
         Signal("abc_act_rad", ("a_act_deg", "b_act_deg", "c_act_deg"), RAD_PER_DEG),
         Signal("correction_mm", ("x_corr_mm", "y_corr_mm", "z_corr_mm"), gaps=True),
         Signal("correction_rad", ("a_corr_deg", "b_corr_deg", "c_corr_deg"), RAD_PER_DEG, gaps=True),
-        Signal("q_correction_rad", _six("q{}_corr_deg"), RAD_PER_DEG, each=True, gaps=True),
+        Signal("q_correction_rad", _six("q{}_corr_deg"), RAD_PER_DEG, one_by_one=True, gaps=True),
         *TEMPERATURES,
     ),
     Poses: (
@@ -233,8 +233,8 @@ def build(
 ) -> AnyMeasured:
     """Return the table of a file.
 
-    A signal must have all of its columns or none, except joints that ``Signal.each`` (or ``partial`` for
-    commanded and actual angles) allows to be missing; rows with a missing value are dropped and counted.
+    A signal must have all of its columns or none, except joints that ``Signal.one_by_one`` (or ``partial``
+    for commanded and actual angles) allows to be missing; rows with a missing value are dropped and counted.
 
     Raises `NotUnderstoodError` for a missing column, and for fewer than 10 rows.
     """
@@ -299,7 +299,7 @@ def _is_there(signal: Signal, there: set[str], sheet: Sheet, partial: bool) -> b
     absent = [column for column in signal.columns if column not in there]
     if not absent:
         return True
-    loose = signal.each or (signal.joints and partial)
+    loose = signal.one_by_one or (signal.joints and partial)
     if len(absent) == len(signal.columns) and signal.name not in _ALWAYS:
         return False
     if loose and len(absent) < len(signal.columns):

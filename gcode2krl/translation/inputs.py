@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from gcode2krl.errors import Gcode2KrlError, Issue, input_error
 from gcode2krl.files.program_names import DIALECT_NAMES, PACKED_ENDING
+from gcode2krl.files.there import is_there
 from gcode2krl.progress import Begin, unseen
 
 if TYPE_CHECKING:
@@ -205,15 +206,8 @@ def cell_files(path: str | Path | None) -> list[Path]:
             continue
         files.append(file)
         if file.suffix.lower() == ".toml" or len(files) == 1:
-            waiting += (file.parent / name for name in _names_in(file) if _is_file(file.parent / name))
+            waiting += (file.parent / name for name in _names_in(file) if is_there(file.parent / name))
     return files
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a text that is too long for the name of a file
-        return False
 
 
 def _names_in(file: Path) -> list[str]:

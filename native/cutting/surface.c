@@ -181,9 +181,9 @@ static bool renew_cube(const Stock *stock, const Surface *surface, const int64_t
     for (int n = 0; n < count; n++)
         latest = ends[n].stamp > latest ? ends[n].stamp : latest;
     AT(surface->facing, number) = usual_facing(ends, count);
-    if (latest > OF_EARLIER && !are_alike(*shape, AT(surface->left, number))) {
+    if (latest > OF_EARLIER && !are_alike(*shape, AT(surface->shape_left, number))) {
         AT(surface->point, number) = (int32_t)(point + (latest - OF_EARLIER - 1) * stride);
-        AT(surface->left, number) = *shape;
+        AT(surface->shape_left, number) = *shape;
     }
     return *shape != before;
 }

@@ -15,12 +15,12 @@ void report_at(Block *block, int32_t line, int32_t number, Says says) {
     Counts *counts = block->counts;
     if (counts->mute)
         return;
-    const FoundView found = block->machine->found;
+    const FoundView raised = block->machine->raised;
     const bool warning = is_warning(number);
     counts->errors += !warning;
-    const int64_t room = warning ? found.rows / 2 : found.rows; /* warnings never crowd out an error */
+    const int64_t room = warning ? raised.rows / 2 : raised.rows; /* warnings never crowd out an error */
     if (counts->findings < room)
-        AT(found, counts->findings++) = (Found){number, line, says.a, says.b, says.c};
+        AT(raised, counts->findings++) = (Found){number, line, says.a, says.b, says.c};
     else
         counts->dropped++;
 }

@@ -59,15 +59,3 @@ def test_smallest_seen():
     assert figures.smallest_seen(seen) == 0.7
     assert figures.smallest_seen(seen[:1]) is None
     assert figures.smallest_seen([(3.0, True), (2.0, False), (1.0, True)]) == 3.0
-
-
-def test_the_lasso_finds_two_of_many():
-    rng = np.random.default_rng(1)
-    wide = rng.normal(size=(400, 30))
-    wide /= np.linalg.norm(wide, axis=0)
-    y = 5.0 * wide[:, 3] - 4.0 * wide[:, 17] + 0.05 * rng.normal(size=400)
-    groups = [("effect", f"A{i}") for i in range(30)]
-    named = baselines._lasso(y, wide, np.arange(30), groups)
-    assert sorted(named) == [["effect", "A17"], ["effect", "A3"]]
-    assert baselines._best_correlation(y, wide, np.arange(30), groups) == [["effect", "A3"]]
-    assert baselines._lasso(np.zeros(400), wide, np.arange(30), groups) == []

@@ -1,4 +1,4 @@
-"""Parts of the judgement: places in time, parameters, dependences, tests; on answers made by hand."""
+"""Parts of the judgement: places in time, parameters, dependences; on answers made by hand."""
 
 from importlib import import_module
 
@@ -9,7 +9,6 @@ from tests.benchmarks.hand_made import answer, cause, depends, effect
 places = import_module("blind.score")
 numbers = import_module("blind.score")
 dependences = import_module("blind.score")
-tests = import_module("blind.score")
 
 
 def said(value, low, high):
@@ -104,8 +103,7 @@ def test_a_named_cause_states_its_own_family():
 
 
 @pytest.mark.parametrize(
-    ("on", "stated"),
-    [("time_step", "time in the run"), ("own_torque_memory", "own torque")],
+    ("on", "stated"), [("time_step", "time in the run"), ("own_torque_memory", "own torque")]
 )
 def test_words_of_the_label_and_of_the_answer(on, stated):
     tip = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "step"})
@@ -147,65 +145,3 @@ def test_every_word_of_the_plant_is_one_of_the_answer():
 
 def test_a_label_without_dependences_is_not_scored():
     assert dependences.told(effect(depends=None), answer()) is None
-
-
-TRUTHS = (("backlash", "A2"),)
-
-
-def fates(causes, rest=(), verdict="unexplained", truths=TRUTHS):
-    return tests.tested_of(answer(causes, verdict, rest=rest), truths)
-
-
-def test_tests_that_an_answer_states_count():
-    stated = {"family": True, "form": {"passed": False}, "rest": False}
-    assert fates([cause("friction", probability=0.2, tests=stated)], truths=())[0].failed == {"form", "rest"}
-    listed = [{"test": "form", "passed": False}, {"test": "rest", "passed": True}]
-    assert fates([cause(probability=0.2, tests=listed)])[0].failed == {"form"}
-
-
-def test_tests_are_read_from_the_contract_where_none_are_stated():
-    wrong = cause("friction", probability=0.2, family="A2, reversals", form_fits=0.5)
-    assert fates([wrong], truths=())[0].failed == {"form"}
-    assert fates([wrong], [depends("tip")], truths=())[0].failed == {"form", "family"}
-    assert fates([wrong], [depends("tip", share=0.01)], truths=())[0].failed == {"form"}
-    unsteady = cause(probability=0.2, constant={"inconstancy": 0.4, "p": 1e-4})
-    assert fates([unsteady])[0].failed == {"constancy"}
-    assert fates([cause(probability=0.2)])[0].failed == {tests.UNDECIDED}
-
-
-def test_tests_that_are_plain_numbers_say_nothing_of_passing():
-    """They are what a probability is made of: zero is no failure."""
-    numbers = {"margin": 12.0, "other_share": 0.0, "conditions_failed": 0, "fold_agreement": None}
-    wrong = cause("friction", probability=0.2, form_fits=0.5, tests=numbers)
-    assert fates([wrong], truths=())[0].failed == {"form"}
-    assert fates([cause("friction", probability=0.2, tests=numbers)], truths=())[0].failed == {
-        tests.UNDECIDED
-    }
-
-
-def test_a_right_cause_that_is_not_there_is_lost_too():
-    assert fates([], verdict="no_gap")[0].failed == {tests.NO_GAP}
-    wrong, right = fates([cause("friction")])
-    assert (wrong.is_right, wrong.is_named) == (False, True)
-    assert (right.is_right, right.failed) == (True, {tests.UNLISTED})
-
-
-def test_each_of_two_truths_has_a_fate():
-    two = (("backlash", "A2"), ("clock", "force"))
-    named, lost = fates([cause(), cause("clock", "force", 0.3)], truths=two)
-    assert (named.is_right, named.is_named) == (True, True)
-    assert (lost.is_right, lost.is_named) == (True, False)
-    assert fates([cause()], truths=two)[1].failed == {tests.UNLISTED}
-
-
-def test_ablation_counts_what_no_other_test_stopped():
-    made = [
-        tests.Tested(False, False, frozenset({"form"})),
-        tests.Tested(False, False, frozenset({"form", "rest"})),
-        tests.Tested(True, False, frozenset({"rest"})),
-        tests.Tested(True, True, frozenset()),
-    ]
-    assert tests.ablation(made) == [
-        tests.Ablation("form", 2, 1, 0, 0),
-        tests.Ablation("rest", 1, 0, 1, 1),
-    ]

@@ -57,6 +57,7 @@ def test_a_cell_without_obstacles_has_none_and_5_mm():
         ),
         ("plane = { point_mm = [0, 0, 0], normal = [0, 0, 0] }", "normal is zero"),
         ('mesh = "missing.stl"', "there is no file 'missing.stl'"),
+        (f'mesh = "{"m" * 400}.stl"', f"there is no file '{'m' * 80}'"),
         ("box_mm = [[0, 0, 0], [1, 1]]", "obstacle.0.box_mm.1.2: missing"),
         ('box_mm = [[0, 0, 0], [1, 1, 1]]\nframe = "tool"', "allowed: 'base', 'robroot' or 'world'"),
         ("box_mm = [[0, 0, 0], [1, 1, nan]]", "obstacle.0.box_mm.1.2"),

@@ -368,3 +368,13 @@ def test_g_code_is_read_in_a_cell_that_says_nothing_of_the_arm(tmp_path):
     )
     assert isinstance(cell, Cell)
     assert len(read_gcode(write(tmp_path / "part.nc", PART), cell)) > 3
+
+
+def test_a_missing_tool_length_is_told_once_with_its_line(run, tmp_path):
+    write(tmp_path / "cell.toml", 'based_on = "demonstration"\n[tool.30]\ndiameter_mm = 12\nteeth = 3\n')
+    write(tmp_path / "part.nc", "G21 G90\nT30 M6\nS9000 M3\nG0 G43 H30 X0 Y0 Z30\nG1 X20 F1500\nM30\n")
+    done = run("translate", "part.nc", "--cell", "cell.toml", "-o", "part.src")
+    (told,) = (line for line in done.err.splitlines() if "length" in line)
+    assert told.startswith("part.nc:2: error: T30 has no length and no frame in the cell [tool-unknown] -> ")
+    assert done.code == 1
+    assert "follows from these: tool-undeclared 1" in done.err

@@ -32,7 +32,7 @@ def found(toolpath, motion, cell, rows):
     """Return every column of the forces, the findings and what is left, and how many samples there are."""
     removal = remove(toolpath, motion, cell, rows=rows)
     columns = {spec.name: getattr(removal.forces, spec.name) for spec in fields(removal.forces)}
-    return columns | {"part": removal.left.height_mm}
+    return columns | {"part": removal.material.height_mm}
 
 
 def same(one, other):

@@ -40,7 +40,7 @@ def middles(history, axis):
 
 
 def test_its_volume_is_that_of_material_removal(slot, history):
-    left_mm3 = remove(*slot, is_checked=False).left.volume_mm3
+    left_mm3 = remove(*slot, is_checked=False).material.volume_mm3
     assert history.volume_mm3(-1) == pytest.approx(60 * 40 * 20)
     assert history.volume_mm3() == pytest.approx(left_mm3, rel=0.001)
     assert history.volume_mm3() == pytest.approx(60 * (40 * 20 - 16 * 4), rel=0.001)

@@ -199,3 +199,7 @@ def test_readers_say_nothing_by_themselves(tmp_path, capfd):
     file.write_text(text)
     assert load_mesh(file).volume == pytest.approx(BALL.volume, rel=1e-4)  # its own normals count
     assert capfd.readouterr().err == ""
+
+
+def test_a_path_that_no_file_can_have_is_no_file(tmp_path):
+    refused(tmp_path / f"{'m' * 400}.stl", "no such file")

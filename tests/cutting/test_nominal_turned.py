@@ -98,7 +98,7 @@ def cut(tmp_path_factory):
         if toolpath.axis[5] @ AXIS > 0.999:
             break
     motion = plan_motion(toolpath, cell)
-    left = remove(toolpath, motion, cell, is_checked=False).left
+    left = remove(toolpath, motion, cell, is_checked=False).material
     assert isinstance(left, Dexels)
     return left, motion, cell, toolpath
 

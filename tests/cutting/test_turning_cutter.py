@@ -8,13 +8,12 @@ tangential, along the inward normal and along the edge.
 import numpy as np
 import pytest
 
-from benchmarks import five_axis
 from gcode2krl.cutting.cutter import shape_of
 from gcode2krl.cutting.dexels import dexel_block
 from gcode2krl.cutting.turned import TurnedEngagement
-from tests.cutting import scenes
+from tests.cutting import scenes, turning_scenes
 
-FLAT, BALL, BULL, TAPERED = five_axis.TOOLS
+FLAT, BALL, BULL, TAPERED = turning_scenes.TOOLS
 ANGLES = 360
 BOX = np.array([[-40.0, -40.0, -30.0], [40.0, 40.0, 0.0]])
 TIP = np.array([0.31, 0.17, -3.3])
@@ -71,8 +70,8 @@ def brute_force(tool, axis, feed, swing, top_mm=0.0):
 
 def read(tool, axis, feed, swing):
     """Return the same as it is read from dexels."""
-    pose = five_axis.Case("", tool, TIP[None, :] + [[0, 0, 0], 0.1 * feed], np.repeat([axis], 2, axis=0))
-    points = five_axis.points_of(pose)
+    pose = turning_scenes.Case("", tool, TIP[None, :] + [[0, 0, 0], 0.1 * feed], np.repeat([axis], 2, axis=0))
+    points = turning_scenes.points_of(pose)
     points = points._replace(feed_mm=np.repeat([feed], 2, axis=0), swing=np.repeat([swing], 2, axis=0))
     engagement = TurnedEngagement(dexel_block(BOX, tool.diameter_mm / 40.0), [tool], scenes.LAW)
     found = engagement.take(points, ends=True).result
@@ -82,7 +81,7 @@ def read(tool, axis, feed, swing):
 def drawn(seed):
     """Return an axis, a feed of the tip and a swing across the axis; per tooth."""
     chance = np.random.default_rng(seed)
-    axis = five_axis.tilted(*chance.uniform(-25.0, 25.0, 2))
+    axis = turning_scenes.tilted(*chance.uniform(-25.0, 25.0, 2))
     feed = chance.normal(size=3)
     feed *= FEED_MM / np.linalg.norm(feed)
     swing = np.cross(axis, chance.normal(size=3))

@@ -430,11 +430,10 @@ def check_beside(program, number, changed, beside, compare):
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("rs274") is None, reason="Debian package linuxcnc-uspace")
 def test_linuxcnc_reads_and_refuses_the_same(tmp_path, monkeypatch, capsys):
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    import gcode_beside_rs274
+    from tests.reference.rs274 import beside as other
 
-    monkeypatch.setattr(gcode_beside_rs274, "LONGEST_S", 3.0)
-    beside, difference = gcode_beside_rs274.Beside(tmp_path), gcode_beside_rs274.difference
+    monkeypatch.setattr(other, "LONGEST_S", 3.0)
+    beside, difference = other.Beside(tmp_path), other.difference
     rng, tally = random.Random(7), {False: 0, True: 0}
     for path in sorted((RS274 / "programs_macro").iterdir()) + sorted((RS274 / "programs").iterdir())[::80]:
         program = Program(path)

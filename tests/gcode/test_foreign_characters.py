@@ -57,8 +57,17 @@ def test_the_caret_stands_before_the_character():
     assert finding("G1 X10 Y5 (−) Z−4".encode()).excerpt.endswith("Z^???4")
 
 
-def test_a_letter_without_any_number_is_still_that():
-    assert finding(b"G1 X F600").code == "no-number"
+@pytest.mark.parametrize(
+    ("block", "letter"), [(b"G1 X F600", "X"), (b"G1 X10 Y FOO", "Y"), (b"G1 X10 FOO", "F"), (b"FOO", "F")]
+)
+def test_a_letter_without_any_number_is_still_that(block, letter):
+    issue = finding(block)
+    assert (issue.code, issue.message) == ("no-number", f"{letter} is not followed by a number")
+
+
+@pytest.mark.parametrize("block", [b"G1 X10 O<foo> call", b"G1 X10 OFOO", b"G1 X10 GOTO 5"])
+def test_a_word_that_begins_with_o_or_jumps_is_an_o_word(block):
+    assert finding(block).code == "o-word"
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])

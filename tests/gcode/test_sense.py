@@ -1,13 +1,10 @@
 """A declared five-axis machine has a sense: sound programs are silent, a doubt names its key.
 
-Wrong declarations through the command line are in ``benchmarks/mistake_cases_five_axes.py``, run by
+Wrong declarations through the command line are in ``benchmarks/mistake_cases.py``, run by
 ``tests/test_mistakes.py``.
 """
 
 import io
-import sys
-from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +13,8 @@ from gcode2krl import load_cell, read_gcode
 from gcode2krl.cell.sections import Machine, Stock, Table
 from gcode2krl.gcode import read_stream
 from gcode2krl.report.axes import axes_figure
-
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "benchmarks"))
-programs = import_module("five_axis_programs")
+from tests.conftest import ROOT
+from tests.gcode import five_axis_programs as programs
 
 BOX = ((-60.0, -60.0, -50.0), (60.0, 60.0, 0.0))
 AGAINST_ISO = "table-table AC, other signs"

@@ -3,9 +3,7 @@ planner."""
 
 import io
 import json
-import sys
 import tomllib
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +18,8 @@ from gcode2krl.identify.controller import identify_controller
 from gcode2krl.identify.trial_program import CDIS_MM, TURNS, controller_test_program, corner_tolerance_mm
 from gcode2krl.pipeline import controller_test_targets
 from gcode2krl.runs import ControllerTrace
+from tests.identify import made_up_controller as bench
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-bench = import_module("identify_controller")
 Controller = bench.Controller
 
 HEAD = "G21 G90 G17 G40 G49 G80 G94\nT1 M6\nS1000 M3\nG0 G43 H1 Z60\nG0 X100 Y0\nG61\nG4 P0.3\n"

@@ -6,11 +6,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.measured_slots import MILLS, error_of, fit_of, held_out
 from gcode2krl.cell.library import read_model
 from gcode2krl.cell.sections import Material
 from gcode2krl.errors import RefusedError
 from gcode2krl.identify.force import NAMES, UNTESTED_BAND, fit_force
+from tests.identify.measured_slots import MILLS, error_of, fit_of, held_out
 
 TRUE = np.array([850.0, 200.0, 180.0, 20.0, 24.0, 3.0])
 ZERO = np.array([5.0, -8.0, 3.0])

@@ -133,7 +133,6 @@ def test_seventeen_small_errors_of_a_clean_arm():
 
 @pytest.mark.parametrize("arm", pose_arms.MAKERS[1::4], ids=lambda arm: arm.name)
 def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
-    """The benchmark has all six makers."""
     made = pose_arms.hard(arm, 2)
     table, found = identified(made, 300, again=16)
     assert off_by_noise(found, made) < 1.2
@@ -144,7 +143,7 @@ def test_arms_of_other_makers_with_all_that_goes_wrong(arm):
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_nine_times_in_ten():
-    """Slow drift of the figure would be seen by benchmarks/identify_kinematics.py, which draws more."""
+    """Slow drift of the figure would be seen by more draws (`GCODE2KRL_DRAWS`)."""
     inside = []
     for seed in range(4):
         arm = pose_arms.clean(pose_arms.MAKERS[seed], seed + 50)

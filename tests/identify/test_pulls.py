@@ -1,9 +1,6 @@
 """`identify stiffness --pulls`: the form for a cell, and the fit to it filled in."""
 
 import json
-import sys
-from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +12,8 @@ from gcode2krl.compliance import assumed_stiffness, stiffness
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.identify.pulls import fit, form, propose, read_form
 from gcode2krl.robot.standing import limits_rad
+from tests.identify import made_up_pulls as made_up
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-made_up = import_module("identify_pulls")
 TRUE = np.array([3e9, 2e9, 2.5e9, 8e8, 5e8, 4e8])
 
 

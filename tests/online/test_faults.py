@@ -1,15 +1,9 @@
 """Every state with every fault: no answer differs from the one before by more than one step."""
 
-import sys
-from importlib import import_module
-from pathlib import Path
-
 import pytest
 
 from tests.conftest import draws
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-faults = import_module("online_faults")
+from tests.online import faults
 
 
 def check(report):

@@ -198,13 +198,16 @@ BUILDERS = {
 def main(arguments: list[str] | None = None) -> int:
     """Write cases of a kind and print a line for each."""
     parser = argparse.ArgumentParser(prog="python -m tests.plant.kinds", description=__doc__)
-    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("kind", choices=(*KINDS, "names"), help="names: list the effects and stop")
     parser.add_argument("--cases", type=int, default=1, help="how many")
     parser.add_argument("--seed", type=int, default=1, help="of the first case; case i has seed + i")
     parser.add_argument("--effect", help="of the kind's shelf; default: drawn")
     parser.add_argument("--form", choices=["same", "other"], help="default: a third are other forms")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for KIND-0001 …")
+    parser.add_argument("-o", "--output", type=Path, default=Path(), help="folder for KIND-0001 …")
     options = parser.parse_args(arguments)
+    if options.kind == "names":
+        print("\n".join([*LIBRARY, *SLIPS, *(f"open:{name}" for name in UNKNOWN)]))
+        return 0
     for i in range(options.cases):
         start, seed = time.perf_counter(), options.seed + i
         place = options.output / f"{options.kind}-{seed:05d}"

@@ -105,3 +105,5 @@ def test_the_command_line(tmp_path, capsys):
     assert "null-00004" in capsys.readouterr().out
     assert kinds.main(["null", "--seed", "4", "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+    assert kinds.main(["names"]) == 0
+    assert {"backlash", "open:chatter"} <= set(capsys.readouterr().out.split())

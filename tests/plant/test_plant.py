@@ -14,7 +14,7 @@ import pytest
 from gcode2krl import load_cell, predict
 from tests.plant import arm, cases, path
 from tests.plant.effects import LIBRARY
-from tests.plant.make_cases import main
+from tests.plant.kinds import main
 from tests.plant.robot import Run, joints_for, simulate
 from tests.plant.scene import CELL_TOML, World
 from tests.plant.waypoints import PROGRAMS
@@ -191,12 +191,5 @@ def test_mistakes_of_the_user_are_one_line(tmp_path, capsys):
         cases.make_case(1, tmp_path / "case", "gravity", "other")
     with pytest.raises(ValueError, match="A9 is not a target"):
         cases.make_case(1, tmp_path / "case", "backlash@A9")
-    assert main(["--cases", "1", "--effect", "nothing_known", "-o", str(tmp_path)]) == 2
+    assert main(["single", "--effect", "nothing_known", "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_the_command_line_writes_cases_and_never_into_a_full_folder(tmp_path, capsys):
-    assert main(["--cases", "2", "--seed", "5", "--effect", "none", "-o", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.count("none") == 2
-    assert (tmp_path / "case-0002" / "run-3" / "run.toml").exists()
-    assert main(["--cases", "1", "--seed", "5", "-o", str(tmp_path)]) == 2

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.mode_coupling import draw, index_of, simulate
 from gcode2krl import load_cell
 from gcode2krl.cell import resolve_cell
 from gcode2krl.cell.sections import VIRTUAL_JOINTS, TapMode
@@ -18,6 +17,7 @@ from gcode2krl.pose.chatter import coupling_along
 from gcode2krl.pose.spin import stiffest_spin
 from tests.cells import over_demonstration
 from tests.pose.test_spin import PATH, judge_by
+from tests.pose.two_modes import draw, index_of, simulate
 
 SIX = np.array([796.1, 168.8, 222.0, 27.7, 30.8, 1.4])
 PLACE = {"x_mm": 1200.0, "y_mm": -300.0, "z_mm": 400.0, "a_deg": 30.0, "b_deg": 10.0, "c_deg": -20.0}

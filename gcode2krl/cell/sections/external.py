@@ -100,7 +100,7 @@ class ExternalAxis(Provenance):
         matrix[:3, 3] = self.origin
         return matrix
 
-    def rest(self) -> float:
+    def resting_place(self) -> float:
         """Return where it stands when nobody says otherwise: ``position``, ``home``, or nearest to 0."""
         stated = self.position if self.position is not None else self.home
         return stated if stated is not None else min(max(0.0, self.limits[0]), self.limits[1])

@@ -107,7 +107,7 @@ class Deviation:
 class Compared:
     """The finished part against the nominal one."""
 
-    found: list[Deviation]
+    deviations: list[Deviation]
     left_out: int
     """Smaller ones."""
     volume_mm3: dict[str, float]
@@ -131,7 +131,7 @@ class Content:
     """True where so much time is lost that it is worth a word."""
     windows: list[Window] = field(default_factory=list)
     worst: list[Worst] = field(default_factory=list)
-    told: Told = field(default_factory=lambda: told(()))
+    reported: Told = field(default_factory=lambda: told(()))
     not_checked: list[str] = field(default_factory=list)
     head: dict[str, Any] = field(default_factory=dict)
     """What `page.js` reads; ``rows`` is 0 where no path is known."""
@@ -213,7 +213,7 @@ def content_of_refused(
         title=title,
         verdict=verdict,
         sentence=_refusal(shown, verdict),
-        told=shown,
+        reported=shown,
         not_checked=["Everything after the reading of the program: path, time, forces, deflection."],
         head=_head_without_path(listed, text),
         text=packed_text(text or ""),
@@ -266,7 +266,7 @@ def _content(
         is_slow=is_timed and is_worth_saying(lost_whole_s, float(whole.time_s[-1] - whole.time_s[0])),
         windows=[_on_page(window, rows) for window in windows],
         worst=[_worst(quantity, whole, rows) for quantity in whole.quantities if quantity.name != "speed"],
-        told=findings,
+        reported=findings,
         not_checked=[*_not_known(whole, cell), *_collisions(whole, cell), *NOT_CHECKED],
         head=head,
         data=data,

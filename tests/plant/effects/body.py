@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.plant import memory
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import Run, STEP_s, fast, joint_torques
 from tests.plant.scene import DEGREE, LENGTHS, VIRTUAL, euler
 
@@ -15,15 +15,12 @@ def link_length(draw: Draw):
     name = draw.target(LENGTHS)
     row, sign = LENGTHS.index(name), draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            lengths = run.world.lengths_mm.copy()
-            lengths[row] += sign * size
-            run.world = run.world.but(lengths_mm=lengths)
+    def world(run: Run, size: float):
+        lengths = run.world.lengths_mm.copy()
+        lengths[row] += sign * size
+        run.world = run.world.but(lengths_mm=lengths)
 
-        return numbers(mm=sign * size), {"world": world}
-
-    return name, at
+    return name, acting(world, mm=lambda size: sign * size)
 
 
 @other_form("link_length")
@@ -102,15 +99,12 @@ def tool_frame(draw: Draw):
 def thermal(draw: Draw):
     way, constant_h = draw.direction(), draw.log_uniform(0.5, 3.0)
 
-    def at(size):
-        def tip(run: Run):
-            hours = (run.age_s + run.elapsed_s) / 3600.0
-            grown = size * constant_h * -np.expm1(-hours / constant_h)
-            run.tip_mm = run.tip_mm + grown[:, None] * way
+    def tip(run: Run, size: float):
+        hours = (run.age_s + run.elapsed_s) / 3600.0
+        grown = size * constant_h * -np.expm1(-hours / constant_h)
+        run.tip_mm = run.tip_mm + grown[:, None] * way
 
-        return numbers(mm_per_h=size, time_constant_h=constant_h, direction=way), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_h=SIZE, time_constant_h=constant_h, direction=way)
 
 
 @other_form("thermal")
@@ -119,15 +113,12 @@ def thermal_of_two_bodies(draw: Draw):
     one, two = draw.direction(), draw.direction()
     fast_h, slow_h = draw.log_uniform(0.15, 0.5), draw.log_uniform(1.0, 4.0)
 
-    def at(size):
-        def tip(run: Run):
-            hours = ((run.age_s + run.elapsed_s) / 3600.0)[:, None]
-            quick, late = (size * c * -np.expm1(-hours / c) for c in (fast_h, slow_h))
-            run.tip_mm = run.tip_mm + quick * (0.5 * one + 0.5 * two) + late * two
+    def tip(run: Run, size: float):
+        hours = ((run.age_s + run.elapsed_s) / 3600.0)[:, None]
+        quick, late = (size * c * -np.expm1(-hours / c) for c in (fast_h, slow_h))
+        run.tip_mm = run.tip_mm + quick * (0.5 * one + 0.5 * two) + late * two
 
-        return numbers(mm_per_h=size, time_constant_h=slow_h, second_h=fast_h), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_h=SIZE, time_constant_h=slow_h, second_h=fast_h)
 
 
 def _softer(row: int, factors) -> dict:
@@ -258,13 +249,10 @@ def swing(run: Run, way: np.ndarray, hz: float, damping: float, share: float) ->
 def vibration(draw: Draw):
     way, hz, damping = draw.direction(), draw.uniform(7.0, 25.0), draw.log_uniform(0.01, 0.06)
 
-    def at(size):
-        def tip(run: Run):
-            run.tip_mm = run.tip_mm + swing(run, way, hz, damping, size)[:, None] * way
+    def tip(run: Run, size: float):
+        run.tip_mm = run.tip_mm + swing(run, way, hz, damping, size)[:, None] * way
 
-        return numbers(hz=hz, damping=damping, participation=size, direction=way), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, hz=hz, damping=damping, participation=SIZE, direction=way)
 
 
 @other_form("vibration")
@@ -273,11 +261,8 @@ def vibration_of_two_modes(draw: Draw):
     ways, hz = (draw.direction(), draw.direction()), (draw.uniform(7.0, 13.0), draw.uniform(14.0, 25.0))
     damping = draw.log_uniform(0.01, 0.06)
 
-    def at(size):
-        def tip(run: Run):
-            added = [swing(run, w, f, damping, size)[:, None] * w for w, f in zip(ways, hz, strict=True)]
-            run.tip_mm = run.tip_mm + added[0] + 0.7 * added[1]
+    def tip(run: Run, size: float):
+        added = [swing(run, w, f, damping, size)[:, None] * w for w, f in zip(ways, hz, strict=True)]
+        run.tip_mm = run.tip_mm + added[0] + 0.7 * added[1]
 
-        return numbers(hz=hz[0], second_hz=hz[1], damping=damping, participation=size), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, hz=hz[0], second_hz=hz[1], damping=damping, participation=SIZE)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.plant import masses, memory
 from tests.plant.effects.depends import joint as joint_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, STEP_s, fast, joint_torques
 from tests.plant.scene import DEGREE, JOINTS
 
@@ -28,14 +28,11 @@ def dead_time(draw: Draw):
     """The drive answers `size` seconds late, otherwise exactly: bus cycles between controller and drive."""
     name, axes = draw.axes()
 
-    def at(size):
-        def servo(run: Run):
-            for j in axes:
-                run.q_act[:, j] = np.interp(run.t_s - size, run.t_s, run.q_act[:, j])
+    def servo(run: Run, size: float):
+        for j in axes:
+            run.q_act[:, j] = np.interp(run.t_s - size, run.t_s, run.q_act[:, j])
 
-        return numbers(dead_time_s=size), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, dead_time_s=SIZE)
 
 
 @other_form("dead_time")
@@ -44,15 +41,12 @@ def dead_time_of_two_clocks(draw: Draw):
     name, axes = draw.axes()
     skips_hz, begins = draw.log_uniform(0.05, 0.5), draw.uniform(0.0, 1.0)
 
-    def at(size):
-        def servo(run: Run):
-            late_s = size * (0.5 + np.mod(run.t_s * skips_hz + begins, 1.0))
-            for j in axes:
-                run.q_act[:, j] = np.interp(run.t_s - late_s, run.t_s, run.q_act[:, j])
+    def servo(run: Run, size: float):
+        late_s = size * (0.5 + np.mod(run.t_s * skips_hz + begins, 1.0))
+        for j in axes:
+            run.q_act[:, j] = np.interp(run.t_s - late_s, run.t_s, run.q_act[:, j])
 
-        return numbers(dead_time_s=size, skips_hz=skips_hz), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, dead_time_s=SIZE, skips_hz=skips_hz)
 
 
 LOOP = joint_("smooth", "velocity", "acceleration", links=SERVO)
@@ -67,16 +61,13 @@ def servo_gain(draw: Draw):
     name, axes = draw.axes()
     sign, k_v = draw.sign(), draw.log_uniform(15.0, 60.0)
 
-    def at(size):
-        def servo(run: Run):
-            tau = np.full(len(run.t_s), 1.0 / k_v)
-            for j in axes:
-                command = run.q_act[:, j].copy()
-                run.q_act[:, j] += sign * size * (memory.lag(command, tau, STEP_s) - command)
+    def servo(run: Run, size: float):
+        tau = np.full(len(run.t_s), 1.0 / k_v)
+        for j in axes:
+            command = run.q_act[:, j].copy()
+            run.q_act[:, j] += sign * size * (memory.lag(command, tau, STEP_s) - command)
 
-        return numbers(missing_share=sign * size, k_v_per_s=k_v), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, missing_share=lambda size: sign * size, k_v_per_s=k_v)
 
 
 @other_form("servo_gain")
@@ -86,15 +77,12 @@ def servo_gain_over_a_slow_speed_loop(draw: Draw):
     sign, k_v, faster = draw.sign(), draw.log_uniform(15.0, 60.0), draw.uniform(2.0, 6.0)
     hz, damping = k_v * np.sqrt(faster) / (2.0 * np.pi), 0.5 * np.sqrt(faster)
 
-    def at(size):
-        def servo(run: Run):
-            for j in axes:
-                speed = run.rates(run.q_act[:, j]).copy()
-                run.q_act[:, j] -= sign * size / k_v * memory.second_order(speed, hz, damping, STEP_s)
+    def servo(run: Run, size: float):
+        for j in axes:
+            speed = run.rates(run.q_act[:, j]).copy()
+            run.q_act[:, j] -= sign * size / k_v * memory.second_order(speed, hz, damping, STEP_s)
 
-        return numbers(missing_share=sign * size, k_v_per_s=k_v, faster=faster), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, missing_share=lambda size: sign * size, k_v_per_s=k_v, faster=faster)
 
 
 JERK = joint_("smooth", "jerk", "acceleration", links=SERVO)
@@ -113,16 +101,13 @@ def jerk_feed_forward(draw: Draw):
     name, axes = draw.axes()
     sign, settle_s = draw.sign(), draw.log_uniform(0.004, 0.02)
 
-    def at(size):
-        def servo(run: Run):
-            tau = np.full(len(run.t_s), settle_s)
-            for j in axes:
-                smooth = memory.lag(memory.lag(_jerk(run, j), tau, STEP_s), tau, STEP_s)
-                run.q_act[:, j] -= sign * size * smooth
+    def servo(run: Run, size: float):
+        tau = np.full(len(run.t_s), settle_s)
+        for j in axes:
+            smooth = memory.lag(memory.lag(_jerk(run, j), tau, STEP_s), tau, STEP_s)
+            run.q_act[:, j] -= sign * size * smooth
 
-        return numbers(s3=sign * size, settle_s=settle_s), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, s3=lambda size: sign * size, settle_s=settle_s)
 
 
 @other_form("jerk_feed_forward")
@@ -131,14 +116,11 @@ def jerk_feed_forward_that_rings(draw: Draw):
     name, axes = draw.axes()
     sign, hz, damping = draw.sign(), draw.uniform(15.0, 40.0), draw.uniform(0.15, 0.5)
 
-    def at(size):
-        def servo(run: Run):
-            for j in axes:
-                run.q_act[:, j] -= sign * size * memory.second_order(_jerk(run, j), hz, damping, STEP_s)
+    def servo(run: Run, size: float):
+        for j in axes:
+            run.q_act[:, j] -= sign * size * memory.second_order(_jerk(run, j), hz, damping, STEP_s)
 
-        return numbers(s3=sign * size, hz=hz, damping=damping), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, s3=lambda size: sign * size, hz=hz, damping=damping)
 
 
 CLIPPED = joint_("smooth", "acceleration", "own_torque", "velocity", links=SERVO)
@@ -174,16 +156,13 @@ def _creeping(draw: Draw, slower: tuple[float, ...]):
     name = draw.target(BELTS)
     j, relax_s = JOINTS.index(name), draw.log_uniform(1.0, 40.0)
 
-    def at(size):
-        def load(run: Run):  # the torque is known after the cut
-            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
-            taus = [np.full(len(torque), relax_s * times) for times in slower]
-            crept = np.mean([memory.lag(torque, tau, SLOW * STEP_s) for tau in taus], axis=0)
-            run.q_load[:, j] += size * DEGREE / 1e6 * fast(run, crept[:, None])[:, 0]
+    def load(run: Run, size: float):  # the torque is known after the cut
+        torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
+        taus = [np.full(len(torque), relax_s * times) for times in slower]
+        crept = np.mean([memory.lag(torque, tau, SLOW * STEP_s) for tau in taus], axis=0)
+        run.q_load[:, j] += size * DEGREE / 1e6 * fast(run, crept[:, None])[:, 0]
 
-        return numbers(deg_per_kNm=size, relax_s=relax_s), {"load": load}
-
-    return name, at
+    return name, acting(load, deg_per_kNm=SIZE, relax_s=relax_s)
 
 
 @declare(LIBRARY, "joint", 1e-3, 10.0, signal="any", needs=("cut",), all_runs=True, depends=WOUND)
@@ -214,13 +193,10 @@ def axis_coupling(draw: Draw):
     """
     sign = draw.sign()
 
-    def at(size):
-        def gear(run: Run):
-            run.q_load[:, 2] += sign * size * run.q_act[:, 1]
+    def gear(run: Run, size: float):
+        run.q_load[:, 2] += sign * size * run.q_act[:, 1]
 
-        return numbers(ratio=sign * size), {"gear": gear}
-
-    return None, at
+    return None, acting(gear, ratio=lambda size: sign * size)
 
 
 @other_form("axis_coupling")
@@ -228,10 +204,7 @@ def axis_coupling_of_a_crank(draw: Draw):
     """Two cranks of unequal radius: the coupling goes with the sine of A2's angle."""
     sign, phase = draw.sign(), draw.uniform(-0.5, 0.5)
 
-    def at(size):
-        def gear(run: Run):
-            run.q_load[:, 2] += sign * size * 2.0 * np.sin(0.5 * run.q_act[:, 1] + phase)
+    def gear(run: Run, size: float):
+        run.q_load[:, 2] += sign * size * 2.0 * np.sin(0.5 * run.q_act[:, 1] + phase)
 
-        return numbers(ratio=sign * size, phase=phase), {"gear": gear}
-
-    return None, at
+    return None, acting(gear, ratio=lambda size: sign * size, phase=phase)

@@ -5,7 +5,7 @@ import numpy as np
 from tests.plant import memory
 from tests.plant.effects.depends import force as force_
 from tests.plant.effects.depends import tip as tip_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.effects.steps import gone, ramp
 from tests.plant.robot import Run, fast
 from tests.plant.scene import DEGREE, JOINTS
@@ -67,13 +67,10 @@ def _ratcheting(draw: Draw, way_of):
     """The tip after so many slips; `way_of(count)` in units of the first."""
     target, hold_N, way = draw.target(("tip",)), draw.uniform(90.0, 210.0), draw.direction()
 
-    def at(size):
-        def tip(run: Run) -> None:
-            run.tip_mm = run.tip_mm + size * way_of(_slips(run, hold_N))[:, None] * way
+    def tip(run: Run, size: float) -> None:
+        run.tip_mm = run.tip_mm + size * way_of(_slips(run, hold_N))[:, None] * way
 
-        return numbers(mm=size, hold_N=hold_N, direction=way), {"tip": tip}
-
-    return target, at
+    return target, acting(tip, mm=SIZE, hold_N=hold_N, direction=way)
 
 
 @declare(

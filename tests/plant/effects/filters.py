@@ -6,7 +6,7 @@ from scipy.ndimage import uniform_filter1d
 from tests.plant import memory
 from tests.plant.effects.depends import force as force_
 from tests.plant.effects.depends import tip as tip_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, other_form
 from tests.plant.robot import Run, STEP_s
 
 SMOOTHED = tip_("smooth", "velocity", "acceleration")
@@ -16,31 +16,23 @@ SMOOTHED = tip_("smooth", "velocity", "acceleration")
 def tracker_filter(draw: Draw):
     """The tracker smooths its places by a first-order filter of `size` seconds."""
 
-    def at(size):
-        def tip(run: Run):
-            tau = np.full(len(run.t_s), size)
-            run.tip_mm = np.stack(
-                [memory.lag(run.tip_mm[:, k].copy(), tau, STEP_s) for k in range(3)], axis=1
-            )
+    def tip(run: Run, size: float):
+        tau = np.full(len(run.t_s), size)
+        run.tip_mm = np.stack([memory.lag(run.tip_mm[:, k].copy(), tau, STEP_s) for k in range(3)], axis=1)
 
-        return numbers(tau_s=size), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, tau_s=SIZE)
 
 
 @other_form("tracker_filter")
 def tracker_average(draw: Draw):
     """A moving average over the last `size` times two."""
 
-    def at(size):
-        def tip(run: Run):
-            width = max(1, round(2.0 * size / STEP_s))
-            late = uniform_filter1d(run.tip_mm, width, axis=0, mode="nearest", origin=(width - 1) // 2)
-            run.tip_mm = late if width > 1 else run.tip_mm
+    def tip(run: Run, size: float):
+        width = max(1, round(2.0 * size / STEP_s))
+        late = uniform_filter1d(run.tip_mm, width, axis=0, mode="nearest", origin=(width - 1) // 2)
+        run.tip_mm = late if width > 1 else run.tip_mm
 
-        return numbers(tau_s=size, window_s=2.0 * size), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, tau_s=SIZE, window_s=lambda size: 2.0 * size)
 
 
 FULL_N = 300.0
@@ -54,31 +46,27 @@ def force_hysteresis(draw: Draw):
     The reading lacks that share of what a play of half the largest force does not follow.
     """
 
-    def at(size):
-        def sense(run: Run):
-            for k in range(3):
-                force = np.append(0.0, run.sensed_N[:, k])  # from rest without a load
-                half = np.full(len(force), 0.5 * np.abs(force).max())
-                run.sensed_N[:, k] -= size * (force - memory.play(force, half, 0.0))[1:]
+    def sense(run: Run, size: float):
+        for k in range(3):
+            force = np.append(0.0, run.sensed_N[:, k])  # from rest without a load
+            half = np.full(len(force), 0.5 * np.abs(force).max())
+            run.sensed_N[:, k] -= size * (force - memory.play(force, half, 0.0))[1:]
 
-        return numbers(loss_percent=100.0 * size), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, loss_percent=lambda size: 100.0 * size)
 
 
 @other_form("force_hysteresis")
 def force_hysteresis_of_a_rubbing_mount(draw: Draw):
     """The mount rubs with a force of its own, whatever the load: a plain play of the reading."""
 
-    def at(size):
-        def sense(run: Run):
-            half = np.full(len(run.slow_s), 0.5 * size * FULL_N)
-            for k in range(3):
-                run.sensed_N[:, k] = memory.play(run.sensed_N[:, k].copy(), half, 0.0)
+    def sense(run: Run, size: float):
+        half = np.full(len(run.slow_s), 0.5 * size * FULL_N)
+        for k in range(3):
+            run.sensed_N[:, k] = memory.play(run.sensed_N[:, k].copy(), half, 0.0)
 
-        return numbers(loss_percent=100.0 * size, half_N=0.5 * size * FULL_N), {"sense": sense}
-
-    return None, at
+    return None, acting(
+        sense, loss_percent=lambda size: 100.0 * size, half_N=lambda size: 0.5 * size * FULL_N
+    )
 
 
 @other_form("force_hysteresis")
@@ -86,16 +74,11 @@ def force_hysteresis_of_bouc_wen(draw: Draw):
     """A smooth loop over 300 N."""
     sharp = draw.uniform(2.0, 5.0)
 
-    def at(size):
-        def sense(run: Run):
-            for k in range(3):
-                run.sensed_N[:, k] -= (
-                    size * FULL_N * memory.bouc_wen(run.sensed_N[:, k].copy(), FULL_N, sharp)
-                )
+    def sense(run: Run, size: float):
+        for k in range(3):
+            run.sensed_N[:, k] -= size * FULL_N * memory.bouc_wen(run.sensed_N[:, k].copy(), FULL_N, sharp)
 
-        return numbers(loss_percent=100.0 * size, sharpness=sharp), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, loss_percent=lambda size: 100.0 * size, sharpness=sharp)
 
 
 @declare(
@@ -104,10 +87,7 @@ def force_hysteresis_of_bouc_wen(draw: Draw):
 def force_steps(draw: Draw):
     """The reading comes in a ladder of `size` newtons: a range that is far too wide."""
 
-    def at(size):
-        def sense(run: Run):
-            run.sensed_N = size * np.round(run.sensed_N / size)
+    def sense(run: Run, size: float):
+        run.sensed_N = size * np.round(run.sensed_N / size)
 
-        return numbers(step_N=size), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, step_N=SIZE)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.plant import memory
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, STEP_s
 
 PARTS = ("tangential", "radial", "axial")
@@ -38,14 +38,11 @@ def force_scale(draw: Draw):
 
 @declare(LIBRARY, "force", 0.03, 2.0, needs=("cut",))
 def tool_wear(draw: Draw):
-    def at(size):
-        def load(run: Run):
-            grown = (1.0 + size * run.metres_cut)[:, None]
-            run.force_N, run.moment_Nmm = run.force_N * grown, run.moment_Nmm * grown
+    def load(run: Run, size: float):
+        grown = (1.0 + size * run.metres_cut)[:, None]
+        run.force_N, run.moment_Nmm = run.force_N * grown, run.moment_Nmm * grown
 
-        return numbers(growth_per_m=size), {"load": load}
-
-    return None, at
+    return None, acting(load, growth_per_m=SIZE)
 
 
 @other_form("tool_wear")
@@ -53,42 +50,33 @@ def tool_wear_that_settles(draw: Draw):
     """Fast at first, then hardly any more: the fresh edge runs in."""
     length_m = draw.uniform(0.1, 0.4)
 
-    def at(size):
-        def load(run: Run):
-            grown = (1.0 + size * length_m * -np.expm1(-run.metres_cut / length_m))[:, None]
-            run.force_N, run.moment_Nmm = run.force_N * grown, run.moment_Nmm * grown
+    def load(run: Run, size: float):
+        grown = (1.0 + size * length_m * -np.expm1(-run.metres_cut / length_m))[:, None]
+        run.force_N, run.moment_Nmm = run.force_N * grown, run.moment_Nmm * grown
 
-        return numbers(growth_per_m=size, settles_m=length_m), {"load": load}
-
-    return None, at
+    return None, acting(load, growth_per_m=SIZE, settles_m=length_m)
 
 
 @declare(LIBRARY, "force", 0.01, 0.06, needs=("cut",))
 def runout(draw: Draw):
     phase = draw.uniform(0.0, 2.0 * np.pi)
 
-    def at(size):
-        def world(run: Run):
-            teeth = run.world.cutter.teeth
-            offsets = size * np.cos(2.0 * np.pi * np.arange(teeth) / teeth + phase)
-            run.world = run.world.cutting(runout_mm=offsets)
+    def world(run: Run, size: float):
+        teeth = run.world.cutter.teeth
+        offsets = size * np.cos(2.0 * np.pi * np.arange(teeth) / teeth + phase)
+        run.world = run.world.cutting(runout_mm=offsets)
 
-        return numbers(runout_mm=size, angle_deg=float(np.degrees(phase))), {"world": world}
-
-    return None, at
+    return None, acting(world, runout_mm=SIZE, angle_deg=float(np.degrees(phase)))
 
 
 @other_form("runout")
 def runout_of_one_tooth(draw: Draw):
     """One tooth set back, the others true: a chipped edge."""
 
-    def at(size):
-        def world(run: Run):
-            run.world = run.world.cutting(runout_mm=np.array([0.0, 0.0, -1.5 * size]))
+    def world(run: Run, size: float):
+        run.world = run.world.cutting(runout_mm=np.array([0.0, 0.0, -1.5 * size]))
 
-        return numbers(runout_mm=size, teeth="one set back"), {"world": world}
-
-    return None, at
+    return None, acting(world, runout_mm=SIZE, teeth="one set back")
 
 
 @declare(LIBRARY, "force", 0.2, 6.0, needs=("cut",))
@@ -96,15 +84,12 @@ def stock_offset(draw: Draw):
     name = draw.target(("x", "y"))
     sign = draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            stock = run.world.stock_mm.copy()
-            stock[:, "xy".index(name)] += sign * size
-            run.world = run.world.but(stock_mm=stock)
+    def world(run: Run, size: float):
+        stock = run.world.stock_mm.copy()
+        stock[:, "xy".index(name)] += sign * size
+        run.world = run.world.but(stock_mm=stock)
 
-        return numbers(offset_mm=sign * size), {"world": world}
-
-    return name, at
+    return name, acting(world, offset_mm=lambda size: sign * size)
 
 
 @other_form("stock_offset")
@@ -165,14 +150,11 @@ def force_offset(draw: Draw):
 def force_drift(draw: Draw):
     way = draw.direction()
 
-    def at(size):
-        def sense(run: Run):
-            hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
-            run.sensed_N = run.sensed_N + size * hours[:, None] * way
+    def sense(run: Run, size: float):
+        hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
+        run.sensed_N = run.sensed_N + size * hours[:, None] * way
 
-        return numbers(N_per_h=size, direction=way), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, N_per_h=SIZE, direction=way)
 
 
 @other_form("force_drift")
@@ -180,26 +162,20 @@ def force_drift_that_settles(draw: Draw):
     """A drift that dies away as the sensor's electronics warm up."""
     way, constant_h = draw.direction(), draw.uniform(0.6, 3.0)
 
-    def at(size):
-        def sense(run: Run):
-            hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
-            run.sensed_N = run.sensed_N - size * constant_h * np.expm1(-hours / constant_h)[:, None] * way
+    def sense(run: Run, size: float):
+        hours = (run.age_s + run.elapsed_s[::SLOW]) / 3600.0
+        run.sensed_N = run.sensed_N - size * constant_h * np.expm1(-hours / constant_h)[:, None] * way
 
-        return numbers(N_per_h=size, direction=way, time_constant_h=constant_h), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, N_per_h=SIZE, direction=way, time_constant_h=constant_h)
 
 
 @declare(LIBRARY, "sensor", 5.0, 200.0, signal="force")
 def tool_weight(draw: Draw):
-    def at(size):
-        def sense(run: Run):
-            down = np.einsum("nji,j->ni", run.sensor_axes, np.array([0.0, 0.0, -1.0]))
-            run.sensed_N = run.sensed_N + size * down
+    def sense(run: Run, size: float):
+        down = np.einsum("nji,j->ni", run.sensor_axes, np.array([0.0, 0.0, -1.0]))
+        run.sensed_N = run.sensed_N + size * down
 
-        return numbers(weight_N=size), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, weight_N=SIZE)
 
 
 def turned_since_first(axes: np.ndarray) -> np.ndarray:
@@ -214,14 +190,11 @@ def turned_since_first(axes: np.ndarray) -> np.ndarray:
 def hose_pack(draw: Draw):
     way, matrix = draw.direction(), draw.rng.uniform(-1.0, 1.0, (3, 3))
 
-    def at(size):
-        def sense(run: Run):
-            turned = turned_since_first(run.sensor_axes)
-            run.sensed_N = run.sensed_N + size * (way + turned @ (3.0 * matrix).T)
+    def sense(run: Run, size: float):
+        turned = turned_since_first(run.sensor_axes)
+        run.sensed_N = run.sensed_N + size * (way + turned @ (3.0 * matrix).T)
 
-        return numbers(h0_N=size * way, H_N_rad=3.0 * size * matrix), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, h0_N=lambda size: size * way, H_N_rad=lambda size: 3.0 * size * matrix)
 
 
 @other_form("hose_pack")
@@ -229,68 +202,53 @@ def hose_pack_with_place(draw: Draw):
     """A hose that also pulls harder the further the tool is from where it hangs."""
     way, place = draw.direction(), draw.rng.uniform([-200.0, -300.0, 100.0], [200.0, 300.0, 400.0])
 
-    def at(size):
-        def sense(run: Run):
-            pull = (place - run.place_mm[::SLOW]) / 300.0
-            along = np.einsum("nji,nj->ni", run.sensor_axes, pull)
-            run.sensed_N = run.sensed_N + size * (way + 0.5 * along)
+    def sense(run: Run, size: float):
+        pull = (place - run.place_mm[::SLOW]) / 300.0
+        along = np.einsum("nji,nj->ni", run.sensor_axes, pull)
+        run.sensed_N = run.sensed_N + size * (way + 0.5 * along)
 
-        return numbers(h0_N=size * way, hangs_mm=place), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, h0_N=lambda size: size * way, hangs_mm=place)
 
 
 @declare(LIBRARY, "sensor", 0.004, 0.15, signal="force", needs=("cut",))
 def force_delay(draw: Draw):
-    def at(size):
-        def sense(run: Run):
-            for k in range(3):
-                run.sensed_N[:, k] = np.interp(run.slow_s - size, run.slow_s, run.sensed_N[:, k])
-                run.sensed_Nmm[:, k] = np.interp(run.slow_s - size, run.slow_s, run.sensed_Nmm[:, k])
+    def sense(run: Run, size: float):
+        for k in range(3):
+            run.sensed_N[:, k] = np.interp(run.slow_s - size, run.slow_s, run.sensed_N[:, k])
+            run.sensed_Nmm[:, k] = np.interp(run.slow_s - size, run.slow_s, run.sensed_Nmm[:, k])
 
-        return numbers(delay_s=size), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, delay_s=SIZE)
 
 
 @other_form("force_delay")
 def force_filter(draw: Draw):
     """A filter of first order instead of a pure delay."""
 
-    def at(size):
-        def sense(run: Run):
-            tau = np.full(len(run.slow_s), size)
-            for values in (run.sensed_N, run.sensed_Nmm):
-                for k in range(3):
-                    values[:, k] = memory.lag(values[:, k].copy(), tau, SLOW * STEP_s)
+    def sense(run: Run, size: float):
+        tau = np.full(len(run.slow_s), size)
+        for values in (run.sensed_N, run.sensed_Nmm):
+            for k in range(3):
+                values[:, k] = memory.lag(values[:, k].copy(), tau, SLOW * STEP_s)
 
-        return numbers(delay_s=size, filter="first order"), {"sense": sense}
-
-    return None, at
+    return None, acting(sense, delay_s=SIZE, filter="first order")
 
 
 @declare(LIBRARY, "part", 0.03, 0.6, signal="scan", needs=("cut", "scan"))
 def tool_diameter(draw: Draw):
     sign = draw.pick([-1.0, -1.0, 1.0])
 
-    def at(size):
-        def world(run: Run):
-            run.world = run.world.cutting(diameter_mm=run.world.cutter.diameter_mm + sign * size)
+    def world(run: Run, size: float):
+        run.world = run.world.cutting(diameter_mm=run.world.cutter.diameter_mm + sign * size)
 
-        return numbers(offset_mm=sign * size), {"world": world}
-
-    return None, at
+    return None, acting(world, offset_mm=lambda size: sign * size)
 
 
 @other_form("tool_diameter")
 def tool_tapered(draw: Draw):
     """A mill that is worn thinner towards its tip."""
 
-    def at(size):
-        def world(run: Run):
-            run.world = run.world.cutting(diameter_mm=run.world.cutter.diameter_mm - 0.7 * size)
-            run.depth_taper_mm = 0.3 * size
+    def world(run: Run, size: float):
+        run.world = run.world.cutting(diameter_mm=run.world.cutter.diameter_mm - 0.7 * size)
+        run.depth_taper_mm = 0.3 * size
 
-        return numbers(offset_mm=-size, at_top=-0.7 * size), {"world": world}
-
-    return None, at
+    return None, acting(world, offset_mm=lambda size: -size, at_top=lambda size: -0.7 * size)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.plant import memory
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import Run, STEP_s, fast, joint_torques, ripple, slack
 from tests.plant.scene import DEGREE
 
@@ -15,14 +15,11 @@ def backlash(draw: Draw):
     name, axes = draw.axes()
     start = draw.uniform(-1.0, 1.0)
 
-    def at(size):
-        def gear(run: Run):
-            for j in axes:
-                run.q_load[:, j] += slack(run.q_act[:, j], size, start)
+    def gear(run: Run, size: float):
+        for j in axes:
+            run.q_load[:, j] += slack(run.q_act[:, j], size, start)
 
-        return numbers(gap_deg=size), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, gap_deg=SIZE)
 
 
 @other_form("backlash")
@@ -31,15 +28,12 @@ def lost_motion_with_torque(draw: Draw):
     name, j = draw.joint()
     start, full_Nmm = draw.uniform(-1.0, 1.0), draw.log_uniform(5e4, 4e5)
 
-    def at(size):
-        def load(run: Run):  # the torque is known after the cut
-            press = np.minimum(np.abs(joint_torques(run)[:, j]) / full_Nmm, 1.0)
-            open_ = fast(run, press[:, None])[:, 0]
-            run.q_load[:, j] += slack(run.q_act[:, j], size * (0.4 + 0.6 * open_), start)
+    def load(run: Run, size: float):  # the torque is known after the cut
+        press = np.minimum(np.abs(joint_torques(run)[:, j]) / full_Nmm, 1.0)
+        open_ = fast(run, press[:, None])[:, 0]
+        run.q_load[:, j] += slack(run.q_act[:, j], size * (0.4 + 0.6 * open_), start)
 
-        return numbers(gap_deg=size, full_torque_Nm=full_Nmm / 1000.0), {"load": load}
-
-    return name, at
+    return name, acting(load, gap_deg=SIZE, full_torque_Nm=full_Nmm / 1000.0)
 
 
 @other_form("backlash")
@@ -48,14 +42,11 @@ def soft_play(draw: Draw):
     name, j = draw.joint()
     start = draw.uniform(-1.0, 1.0)
 
-    def at(size):
-        def gear(run: Run):
-            q = run.q_act[:, j]
-            run.q_load[:, j] += sum(slack(q, size * w, start) for w in (0.5, 1.0, 1.5)) / 3.0
+    def gear(run: Run, size: float):
+        q = run.q_act[:, j]
+        run.q_load[:, j] += sum(slack(q, size * w, start) for w in (0.5, 1.0, 1.5)) / 3.0
 
-        return numbers(gap_deg=size, plays=3), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, gap_deg=SIZE, plays=3)
 
 
 @declare(LIBRARY, "joint", 0.0008, 0.03)
@@ -63,14 +54,11 @@ def friction(draw: Draw):
     name, j = draw.joint()
     decay_s = draw.log_uniform(0.03, 0.4)
 
-    def at(size):
-        def servo(run: Run):
-            speed = run.rates(run.q_cmd)[:, j]
-            run.q_act[:, j] += memory.reversal_spikes(speed, size * DEGREE, decay_s, STEP_s, STILL_rad_s)
+    def servo(run: Run, size: float):
+        speed = run.rates(run.q_cmd)[:, j]
+        run.q_act[:, j] += memory.reversal_spikes(speed, size * DEGREE, decay_s, STEP_s, STILL_rad_s)
 
-        return numbers(spike_deg=size, decay_s=decay_s), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, spike_deg=SIZE, decay_s=decay_s)
 
 
 @other_form("friction")
@@ -80,16 +68,13 @@ def friction_of_bristles(draw: Draw):
     decay_s, breakaway = draw.log_uniform(0.05, 0.4), draw.log_uniform(5e-5, 5e-4)
     extra = draw.uniform(0.0, 0.4)
 
-    def at(size):
-        def servo(run: Run):
-            speed = run.rates(run.q_cmd)[:, j].copy()
-            torque = memory.lugre(speed, breakaway, 0.01, extra, STEP_s)
-            left = memory.high_pass(torque, decay_s, STEP_s)
-            run.q_act[:, j] -= 0.5 * size * DEGREE * left
+    def servo(run: Run, size: float):
+        speed = run.rates(run.q_cmd)[:, j].copy()
+        torque = memory.lugre(speed, breakaway, 0.01, extra, STEP_s)
+        left = memory.high_pass(torque, decay_s, STEP_s)
+        run.q_act[:, j] -= 0.5 * size * DEGREE * left
 
-        return numbers(spike_deg=size, decay_s=decay_s, breakaway_rad=breakaway), {"servo": servo}
-
-    return name, at
+    return name, acting(servo, spike_deg=SIZE, decay_s=decay_s, breakaway_rad=breakaway)
 
 
 @declare(LIBRARY, "joint", 0.0008, 0.02)
@@ -97,13 +82,10 @@ def transmission(draw: Draw):
     name, j = draw.joint()
     harmonic, phase = draw.pick([1, 2]), draw.uniform(0.0, 2.0 * np.pi)
 
-    def at(size):
-        def gear(run: Run):
-            run.q_load[:, j] += ripple(run.q_act[:, j], j, size, harmonic, phase)
+    def gear(run: Run, size: float):
+        run.q_load[:, j] += ripple(run.q_act[:, j], j, size, harmonic, phase)
 
-        return numbers(amplitude_deg=size, harmonic=harmonic, phase=phase), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, amplitude_deg=SIZE, harmonic=harmonic, phase=phase)
 
 
 @other_form("transmission")
@@ -112,14 +94,11 @@ def transmission_of_two(draw: Draw):
     name, j = draw.joint()
     share, one, two = draw.uniform(0.4, 0.9), *draw.rng.uniform(0.0, 2.0 * np.pi, 2)
 
-    def at(size):
-        def gear(run: Run):
-            q = run.q_act[:, j]
-            run.q_load[:, j] += ripple(q, j, size, 1, one) + ripple(q, j, share * size, 2, two)
+    def gear(run: Run, size: float):
+        q = run.q_act[:, j]
+        run.q_load[:, j] += ripple(q, j, size, 1, one) + ripple(q, j, share * size, 2, two)
 
-        return numbers(amplitude_deg=size, second_share=share, phase=float(one)), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, amplitude_deg=SIZE, second_share=share, phase=float(one))
 
 
 @other_form("transmission")
@@ -128,15 +107,12 @@ def transmission_that_swells(draw: Draw):
     name, j = draw.joint()
     phase, period = draw.uniform(0.0, 2.0 * np.pi), draw.uniform(0.1, 0.4)
 
-    def at(size):
-        def gear(run: Run):
-            q = run.q_act[:, j]
-            swell = 1.0 + 0.6 * np.cos(q * 2.0 * np.pi / period)
-            run.q_load[:, j] += ripple(q, j, size * swell, 1, phase)
+    def gear(run: Run, size: float):
+        q = run.q_act[:, j]
+        swell = 1.0 + 0.6 * np.cos(q * 2.0 * np.pi / period)
+        run.q_load[:, j] += ripple(q, j, size * swell, 1, phase)
 
-        return numbers(amplitude_deg=size, harmonic=1, phase=phase, swell_rad=period), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, amplitude_deg=SIZE, harmonic=1, phase=phase, swell_rad=period)
 
 
 @declare(LIBRARY, "joint", 0.002, 0.2, signal="tcp")
@@ -144,13 +120,10 @@ def mastering(draw: Draw):
     name, j = draw.joint()
     sign = draw.sign()
 
-    def at(size):
-        def gear(run: Run):
-            run.zero_rad[j] += sign * size * DEGREE
+    def gear(run: Run, size: float):
+        run.zero_rad[j] += sign * size * DEGREE
 
-        return numbers(offset_deg=sign * size), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, offset_deg=lambda size: sign * size)
 
 
 @other_form("mastering")
@@ -159,27 +132,21 @@ def mastering_that_creeps(draw: Draw):
     name, j = draw.joint()
     sign = draw.sign()
 
-    def at(size):
-        def gear(run: Run):
-            run.zero_rad[j] += sign * size * DEGREE * (1.0 + 0.15 * run.number)
+    def gear(run: Run, size: float):
+        run.zero_rad[j] += sign * size * DEGREE * (1.0 + 0.15 * run.number)
 
-        return numbers(offset_deg=sign * size, creep=0.15), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, offset_deg=lambda size: sign * size, creep=0.15)
 
 
 @declare(LIBRARY, "joint", 2e-5, 5e-3)
 def wrist_coupling(draw: Draw):
     sign = draw.sign()
 
-    def at(size):
-        def gear(run: Run):
-            run.q_load[:, 4] += sign * size * run.q_act[:, 3]
-            run.q_load[:, 5] += sign * size * (run.q_act[:, 3] + run.q_act[:, 4])
+    def gear(run: Run, size: float):
+        run.q_load[:, 4] += sign * size * run.q_act[:, 3]
+        run.q_load[:, 5] += sign * size * (run.q_act[:, 3] + run.q_act[:, 4])
 
-        return numbers(ratio=sign * size), {"gear": gear}
-
-    return None, at
+    return None, acting(gear, ratio=lambda size: sign * size)
 
 
 @other_form("wrist_coupling")

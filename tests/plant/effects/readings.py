@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.plant import masses, memory
 from tests.plant.effects.depends import joint as joint_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, STEP_s, fast, joint_torques
 from tests.plant.scene import DEGREE, GEAR_RATIO
 
@@ -31,14 +31,11 @@ def gear_twist(draw: Draw):
     """
     name, j = draw.joint()
 
-    def at(size):
-        def sense(run: Run):
-            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
-            _reads(run, j, size * DEGREE * torque / 1e6)
+    def sense(run: Run, size: float):
+        torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
+        _reads(run, j, size * DEGREE * torque / 1e6)
 
-        return numbers(deg_per_kNm=size), {"sense": sense}
-
-    return name, at
+    return name, acting(sense, deg_per_kNm=SIZE)
 
 
 def stiffening(torque: np.ndarray, knee: float) -> np.ndarray:
@@ -55,14 +52,11 @@ def gear_twist_that_stiffens(draw: Draw):
     name, j = draw.joint()
     knee_Nm = draw.log_uniform(100.0, 400.0) if j < 3 else draw.log_uniform(20.0, 80.0)
 
-    def at(size):
-        def sense(run: Run):
-            torque = stiffening(joint_torques(run)[:, j] / 1000.0, knee_Nm)
-            _reads(run, j, size * DEGREE * torque / 1000.0)
+    def sense(run: Run, size: float):
+        torque = stiffening(joint_torques(run)[:, j] / 1000.0, knee_Nm)
+        _reads(run, j, size * DEGREE * torque / 1000.0)
 
-        return numbers(deg_per_kNm=size, knee_Nm=knee_Nm), {"sense": sense}
-
-    return name, at
+    return name, acting(sense, deg_per_kNm=SIZE, knee_Nm=knee_Nm)
 
 
 @other_form("gear_twist")
@@ -71,15 +65,12 @@ def gear_twist_that_lags(draw: Draw):
     name, j = draw.joint()
     tau_s = draw.log_uniform(0.005, 0.03)
 
-    def at(size):
-        def sense(run: Run):
-            torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
-            late = memory.lag(torque, np.full(len(torque), tau_s), SLOW * STEP_s)
-            _reads(run, j, size * DEGREE * late / 1e6)
+    def sense(run: Run, size: float):
+        torque = joint_torques(run)[:, j] + masses.joint_moments(run)[:, j]
+        late = memory.lag(torque, np.full(len(torque), tau_s), SLOW * STEP_s)
+        _reads(run, j, size * DEGREE * late / 1e6)
 
-        return numbers(deg_per_kNm=size, tau_s=tau_s), {"sense": sense}
-
-    return name, at
+    return name, acting(sense, deg_per_kNm=SIZE, tau_s=tau_s)
 
 
 INTERPOLATION = joint_("periodic", "motor_angle", links=("servo", "gear"))
@@ -91,14 +82,11 @@ def encoder_interpolation(draw: Draw):
     name, j = draw.joint()
     lines, phase = draw.pick(LINES), draw.uniform(0.0, 2.0 * np.pi)
 
-    def at(size):
-        def sense(run: Run):
-            angle = lines * GEAR_RATIO[j] * run.q_act[:, j]
-            run.q_act[:, j] += size * DEGREE * np.sin(angle + phase)
+    def sense(run: Run, size: float):
+        angle = lines * GEAR_RATIO[j] * run.q_act[:, j]
+        run.q_act[:, j] += size * DEGREE * np.sin(angle + phase)
 
-        return numbers(amplitude_deg=size, lines=lines, phase=phase), {"sense": sense}
-
-    return name, at
+    return name, acting(sense, amplitude_deg=SIZE, lines=lines, phase=phase)
 
 
 @other_form("encoder_interpolation")
@@ -129,13 +117,10 @@ def joint_eccentricity(draw: Draw):
     name, j = draw.joint()
     phase = draw.uniform(0.0, 2.0 * np.pi)
 
-    def at(size):
-        def gear(run: Run):
-            run.q_load[:, j] += size * DEGREE * np.sin(run.q_act[:, j] + phase)
+    def gear(run: Run, size: float):
+        run.q_load[:, j] += size * DEGREE * np.sin(run.q_act[:, j] + phase)
 
-        return numbers(amplitude_deg=size, phase=phase), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, amplitude_deg=SIZE, phase=phase)
 
 
 @other_form("joint_eccentricity")
@@ -144,12 +129,9 @@ def joint_eccentricity_of_two(draw: Draw):
     name, j = draw.joint()
     share, one, two = draw.uniform(0.3, 0.7), *draw.rng.uniform(0.0, 2.0 * np.pi, 2)
 
-    def at(size):
-        def gear(run: Run):
-            q = run.q_act[:, j]
-            wave = np.sin(q + one) - np.sin(one) + share * (np.sin(2.0 * q + two) - np.sin(two))
-            run.q_load[:, j] += size * DEGREE * wave
+    def gear(run: Run, size: float):
+        q = run.q_act[:, j]
+        wave = np.sin(q + one) - np.sin(one) + share * (np.sin(2.0 * q + two) - np.sin(two))
+        run.q_load[:, j] += size * DEGREE * wave
 
-        return numbers(amplitude_deg=size, phase=float(one), second_share=share), {"gear": gear}
-
-    return name, at
+    return name, acting(gear, amplitude_deg=SIZE, phase=float(one), second_share=share)

@@ -132,3 +132,20 @@ class Draw:
 def numbers(**values) -> dict:
     """Parameters as plain Python numbers and lists."""
     return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
+
+
+SIZE = object()
+"""In `acting`: the parameter that is the size itself."""
+
+
+def acting(do: Callable[..., None], **values) -> At:
+    """Return how an effect acts that is one hook, `do(run, size)`, which has the name of its stage.
+
+    Of its parameters `SIZE` is the size, and a function is taken of the size.
+    """
+
+    def at(size: float) -> tuple[dict, Hooks]:
+        known = {k: size if v is SIZE else v(size) if callable(v) else v for k, v in values.items()}
+        return numbers(**known), {do.__name__: lambda run: do(run, size)}
+
+    return at

@@ -6,7 +6,7 @@ from tests.plant import arm as arms
 from tests.plant import masses, memory
 from tests.plant.effects.depends import force as force_
 from tests.plant.effects.depends import tip as tip_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, STEP_s, cut_at, fast, to_root
 
 TONE = tip_("periodic", "tone", "time_smooth")
@@ -62,23 +62,20 @@ def _wobbling(draw: Draw, second: float):
     per_turn = draw.uniform(0.38, 0.48) if draw.sign() > 0.0 else draw.uniform(4.0, 12.0)
     phase = draw.uniform(0.0, 2.0 * np.pi)
 
-    def at(size):
-        def tip(run: Run):
-            seats, axes = masses.hinges(run)
-            axis, turn = axes[:, j], per_turn * run.q_act[::SLOW, j, None] + phase
-            before = seats[:, 2] - seats[:, 1] if j == arms.ELBOW else axes[:, j - 1] if j else arms.X
-            across = before - np.sum(before * axis, axis=1, keepdims=True) * axis
-            across /= np.linalg.norm(across, axis=1, keepdims=True)
-            beside = np.cross(axis, across)
-            tilt = np.cos(turn) * across + np.sin(turn) * beside
-            tilt += second * (np.cos(2.0 * turn) * across + np.sin(2.0 * turn) * beside)
-            lever = to_root(run.world, run.tip_mm)[::SLOW] - seats[:, j]
-            way = size / 1000.0 * np.cross(tilt, lever) @ run.world.base.axes
-            run.tip_mm = run.tip_mm + fast(run, way)
+    def tip(run: Run, size: float):
+        seats, axes = masses.hinges(run)
+        axis, turn = axes[:, j], per_turn * run.q_act[::SLOW, j, None] + phase
+        before = seats[:, 2] - seats[:, 1] if j == arms.ELBOW else axes[:, j - 1] if j else arms.X
+        across = before - np.sum(before * axis, axis=1, keepdims=True) * axis
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        beside = np.cross(axis, across)
+        tilt = np.cos(turn) * across + np.sin(turn) * beside
+        tilt += second * (np.cos(2.0 * turn) * across + np.sin(2.0 * turn) * beside)
+        lever = to_root(run.world, run.tip_mm)[::SLOW] - seats[:, j]
+        way = size / 1000.0 * np.cross(tilt, lever) @ run.world.base.axes
+        run.tip_mm = run.tip_mm + fast(run, way)
 
-        return numbers(amplitude_mrad=size, per_turn=per_turn, phase=phase), {"tip": tip}
-
-    return name, at
+    return name, acting(tip, amplitude_mrad=SIZE, per_turn=per_turn, phase=phase)
 
 
 @declare(LIBRARY, "geometry", 1e-3, 3.0, signal="tcp", all_runs=True, depends=WOBBLES)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.plant import arm as arms
-from tests.plant.effects.registry import SLIPS, Draw, declare, numbers
+from tests.plant.effects.registry import SIZE, SLIPS, Draw, acting, declare, numbers
 from tests.plant.robot import SLOW, Run, fast, joints_for, take_cut, to_base
 from tests.plant.scene import DEGREE, Frame
 from tests.plant.waypoints import PROGRAMS
@@ -39,15 +39,12 @@ def base_number(draw: Draw):
     """The controller computes with another base's frame."""
     way = draw.direction() * np.array([1.0, 1.0, 0.2])
 
-    def at(size):
-        def world(run: Run):
-            base = run.believed.base
-            run.believed = run.believed.but(base=Frame(base.origin_mm + size * way, base.axes))
-            _shift_work(run, size * way)
+    def world(run: Run, size: float):
+        base = run.believed.base
+        run.believed = run.believed.but(base=Frame(base.origin_mm + size * way, base.axes))
+        _shift_work(run, size * way)
 
-        return numbers(frame_off_mm=size * way), {"world": world}
-
-    return None, at
+    return None, acting(world, frame_off_mm=lambda size: size * way)
 
 
 @declare(SLIPS, "set-up", 0.1, 0.7, signal="tcp")
@@ -146,25 +143,22 @@ def other_program(draw: Draw):
     """Another program than predicted: an edited one, or a different one."""
     kind, row_share = draw.pick(["shifted", "slower", "another"]), draw.uniform(0.2, 0.8)
 
-    def at(size):
-        def world(run: Run):
-            way = run.way
-            from_row = max(1, int(row_share * len(way)))
-            if kind == "shifted":
-                place = way.position_mm.copy()
-                place[from_row:, 1] += size
-                run.way = replace(way, position_mm=place)
-            elif kind == "slower":
-                speed = np.where(way.cutting, way.speed_mm_s / (1.0 + 0.2 * size), way.speed_mm_s)
-                run.way = replace(way, speed_mm_s=speed)
-            else:
-                programs = [p().waypoints() for p in PROGRAMS.values()]
-                unlike = [p for p in programs if p.position_mm.shape != way.position_mm.shape]
-                run.way = unlike[(from_row + run.number) % len(unlike)]
+    def world(run: Run, size: float):
+        way = run.way
+        from_row = max(1, int(row_share * len(way)))
+        if kind == "shifted":
+            place = way.position_mm.copy()
+            place[from_row:, 1] += size
+            run.way = replace(way, position_mm=place)
+        elif kind == "slower":
+            speed = np.where(way.cutting, way.speed_mm_s / (1.0 + 0.2 * size), way.speed_mm_s)
+            run.way = replace(way, speed_mm_s=speed)
+        else:
+            programs = [p().waypoints() for p in PROGRAMS.values()]
+            unlike = [p for p in programs if p.position_mm.shape != way.position_mm.shape]
+            run.way = unlike[(from_row + run.number) % len(unlike)]
 
-        return numbers(kind=kind, size=size), {"world": world}
-
-    return None, at
+    return None, acting(world, kind=kind, size=SIZE)
 
 
 @declare(SLIPS, "set-up", 1.0, 1.0)
@@ -174,13 +168,10 @@ def unit(draw: Draw):
         [("tracker", 1e-3), ("tracker", 1.0 / 25.4), ("force", 1e-3), ("force", 0.1019716)]
     )
 
-    def at(size):
-        def sense(run: Run):
-            run.units[table] = factor
+    def sense(run: Run, size: float):
+        run.units[table] = factor
 
-        return numbers(table=table, factor=factor), {"sense": sense}
-
-    return table, at
+    return table, acting(sense, table=table, factor=factor)
 
 
 @declare(SLIPS, "set-up", 1.0, 20.0)
@@ -188,17 +179,14 @@ def swapped_tool(draw: Draw):
     """Another mill in the spindle: thicker or thinner, or longer or shorter."""
     kind, sign = draw.target(("diameter", "length")), draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            if kind == "diameter":
-                diameter = float(np.clip(run.world.cutter.diameter_mm + sign * size, 6.0, 25.0))
-                run.world = run.world.cutting(diameter_mm=diameter)
-            else:
-                tool = run.world.tool
-                below = np.array([0.0, 0.0, -sign * size])
-                run.world = run.world.but(tool=Frame(tool.origin_mm + tool.axes @ below, tool.axes))
-                _shift_work(run, below)
+    def world(run: Run, size: float):
+        if kind == "diameter":
+            diameter = float(np.clip(run.world.cutter.diameter_mm + sign * size, 6.0, 25.0))
+            run.world = run.world.cutting(diameter_mm=diameter)
+        else:
+            tool = run.world.tool
+            below = np.array([0.0, 0.0, -sign * size])
+            run.world = run.world.but(tool=Frame(tool.origin_mm + tool.axes @ below, tool.axes))
+            _shift_work(run, below)
 
-        return numbers(mm=sign * size), {"world": world}
-
-    return kind, at
+    return kind, acting(world, mm=lambda size: sign * size)

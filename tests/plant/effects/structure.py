@@ -7,7 +7,7 @@ from tests.plant import arm as arms
 from tests.plant import masses, memory
 from tests.plant.effects.depends import Depends
 from tests.plant.effects.depends import tip as tip_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run, fast, to_root
 from tests.plant.scene import JOINTS
 
@@ -82,13 +82,10 @@ def fixture_compliance(draw: Draw):
     """The fixture gives way under the force on the part, which is the reaction of that on the tool."""
     soft = draw.rng.uniform([0.3, 0.3, 0.05], [1.0, 1.0, 0.4])
 
-    def at(size):
-        def tip(run: Run):
-            _yields(run, -size / 1000.0 * soft * (run.force_N @ run.world.base.axes))
+    def tip(run: Run, size: float):
+        _yields(run, -size / 1000.0 * soft * (run.force_N @ run.world.base.axes))
 
-        return numbers(mm_per_kN=size * soft), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_kN=lambda size: size * soft)
 
 
 @other_form(
@@ -98,17 +95,14 @@ def fixture_that_rubs(draw: Draw):
     """Half of the way is held by friction under the clamps: a loop over the force."""
     soft, grip_N = draw.rng.uniform([0.3, 0.3, 0.05], [1.0, 1.0, 0.4]), draw.uniform(40.0, 120.0)
 
-    def at(size):
-        def tip(run: Run):
-            along = -run.force_N @ run.world.base.axes
-            grip = np.full(len(along), grip_N)
-            held = np.stack([memory.play(along[:, k].copy(), grip, 0.0) for k in range(3)], axis=1)
-            held -= held[0]
-            _yields(run, size / 1000.0 * soft * (0.5 * along + 0.5 * held))
+    def tip(run: Run, size: float):
+        along = -run.force_N @ run.world.base.axes
+        grip = np.full(len(along), grip_N)
+        held = np.stack([memory.play(along[:, k].copy(), grip, 0.0) for k in range(3)], axis=1)
+        held -= held[0]
+        _yields(run, size / 1000.0 * soft * (0.5 * along + 0.5 * held))
 
-        return numbers(mm_per_kN=size * soft, grip_N=grip_N), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_kN=lambda size: size * soft, grip_N=grip_N)
 
 
 def _tilted(run: Run, moment_Nmm: np.ndarray, rad_per_Nmm, foot_mm: np.ndarray) -> np.ndarray:
@@ -173,13 +167,10 @@ def axis_parallelism(draw: Draw):
     """
     name, sign = draw.target(SEATS), draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            run.reshape.append(lambda arm: _askew(arm, name, sign * size / 1000.0))
+    def world(run: Run, size: float):
+        run.reshape.append(lambda arm: _askew(arm, name, sign * size / 1000.0))
 
-        return numbers(mrad=sign * size), {"world": world}
-
-    return name, at
+    return name, acting(world, mrad=lambda size: sign * size)
 
 
 def _askew(arm: arms.Arm, name: str, angle_rad: float, twist_rad: float = 0.0) -> arms.Arm:
@@ -197,11 +188,8 @@ def axis_skew(draw: Draw):
     """Askew in both directions."""
     name, sign, twist = draw.target(SEATS), draw.sign(), draw.uniform(0.4, 1.0) * draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            both = (sign * size / 1000.0, twist * size / 1000.0)
-            run.reshape.append(lambda arm: _askew(arm, name, *both))
+    def world(run: Run, size: float):
+        both = (sign * size / 1000.0, twist * size / 1000.0)
+        run.reshape.append(lambda arm: _askew(arm, name, *both))
 
-        return numbers(mrad=sign * size, twist_mrad=twist * size), {"world": world}
-
-    return name, at
+    return name, acting(world, mrad=lambda size: sign * size, twist_mrad=lambda size: twist * size)

@@ -6,7 +6,7 @@ from tests.plant import arm as arms
 from tests.plant import memory
 from tests.plant.effects.depends import force as force_
 from tests.plant.effects.depends import tip as tip_
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import SLOW, Run
 from tests.plant.scene import DEGREE
 
@@ -43,13 +43,10 @@ def spindle_growth(draw: Draw):
     """`size` in mm along the tool in the end at 13000 rpm; from 0 at each start of the spindle."""
     constant_s = draw.log_uniform(2.0, 12.0)
 
-    def at(size):
-        def tip(run: Run):
-            run.tip_mm = run.tip_mm + size * grown(run, constant_s)[:, None] * _out(run)
+    def tip(run: Run, size: float):
+        run.tip_mm = run.tip_mm + size * grown(run, constant_s)[:, None] * _out(run)
 
-        return numbers(mm=size, time_constant_s=constant_s), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm=SIZE, time_constant_s=constant_s)
 
 
 @other_form("spindle_growth")
@@ -80,13 +77,10 @@ def tracker_drift(draw: Draw):
     """The tracker's stand creeps by `size` in mm an hour from the first run's start."""
     way = draw.direction()
 
-    def at(size):
-        def tip(run: Run):
-            run.tip_mm = run.tip_mm + size * _hours(run) * way
+    def tip(run: Run, size: float):
+        run.tip_mm = run.tip_mm + size * _hours(run) * way
 
-        return numbers(mm_per_h=size, direction=way), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_h=SIZE, direction=way)
 
 
 @other_form("tracker_drift")
@@ -95,16 +89,13 @@ def tracker_drift_with_the_heating(draw: Draw):
     way, turn, period_h = draw.direction(), draw.direction() * 1e-4, draw.uniform(0.5, 1.5)
     stand = draw.rng.uniform([-3500.0, -3500.0, -200.0], [-2000.0, 3500.0, 800.0])
 
-    def at(size):
-        def tip(run: Run):
-            hours = _hours(run)
-            gone = hours + 0.3 * period_h * np.sin(2.0 * np.pi * hours / period_h)
-            turned = np.cross(turn, run.tip_mm - stand)
-            run.tip_mm = run.tip_mm + size * gone * (way + turned)
+    def tip(run: Run, size: float):
+        hours = _hours(run)
+        gone = hours + 0.3 * period_h * np.sin(2.0 * np.pi * hours / period_h)
+        turned = np.cross(turn, run.tip_mm - stand)
+        run.tip_mm = run.tip_mm + size * gone * (way + turned)
 
-        return numbers(mm_per_h=size, direction=way, period_h=period_h), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_per_h=SIZE, direction=way, period_h=period_h)
 
 
 AIR = tip_("smooth", "place", "constant")
@@ -129,14 +120,11 @@ def tracker_refraction(draw: Draw):
     """
     stand = draw.rng.uniform(*STAND_mm)
 
-    def at(size):
-        def tip(run: Run):
-            _, reach = _beam(run, stand)
-            run.tip_mm = run.tip_mm + size * reach**2 * np.array([0.0, 0.0, 1.0])
+    def tip(run: Run, size: float):
+        _, reach = _beam(run, stand)
+        run.tip_mm = run.tip_mm + size * reach**2 * np.array([0.0, 0.0, 1.0])
 
-        return numbers(mm_at_2m=size, stand_mm=stand), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_at_2m=SIZE, stand_mm=stand)
 
 
 @other_form("tracker_refraction", tip_("smooth", "time_smooth", "place"))
@@ -145,17 +133,14 @@ def tracker_refraction_that_wanders(draw: Draw):
     stand, hz = draw.rng.uniform(*STAND_mm), draw.uniform(0.08, 0.4)
     phase = draw.rng.uniform(0.0, 2.0 * np.pi, 2)
 
-    def at(size):
-        def tip(run: Run):
-            beam, reach = _beam(run, stand)
-            up = np.array([0.0, 0.0, 1.0])
-            swing = [np.sin(2.0 * np.pi * hz * (1.0 + 0.37 * i) * run.t_s + phase[i]) for i in (0, 1)]
-            bent = swing[0][:, None] * np.cross(beam, up) + (0.5 + swing[1])[:, None] * up
-            run.tip_mm = run.tip_mm + size * reach**2 * bent
+    def tip(run: Run, size: float):
+        beam, reach = _beam(run, stand)
+        up = np.array([0.0, 0.0, 1.0])
+        swing = [np.sin(2.0 * np.pi * hz * (1.0 + 0.37 * i) * run.t_s + phase[i]) for i in (0, 1)]
+        bent = swing[0][:, None] * np.cross(beam, up) + (0.5 + swing[1])[:, None] * up
+        run.tip_mm = run.tip_mm + size * reach**2 * bent
 
-        return numbers(mm_at_2m=size, stand_mm=stand, hz=hz), {"tip": tip}
-
-    return None, at
+    return None, acting(tip, mm_at_2m=SIZE, stand_mm=stand, hz=hz)
 
 
 READ = force_("smooth", "travel", "own_angle", "place")
@@ -182,15 +167,12 @@ def cable_pull(draw: Draw):
     name, j = draw.joint()
     way = draw.direction()
 
-    def at(size):
-        def load(run: Run):
-            _, axes = arms.pose(run.body(), np.ascontiguousarray(run.q_load[::SLOW]))
-            along = axes @ run.believed.tool.axes.T @ way
-            run.force_N = run.force_N + size * _travel_deg(run, j)[:, None] * along
+    def load(run: Run, size: float):
+        _, axes = arms.pose(run.body(), np.ascontiguousarray(run.q_load[::SLOW]))
+        along = axes @ run.believed.tool.axes.T @ way
+        run.force_N = run.force_N + size * _travel_deg(run, j)[:, None] * along
 
-        return numbers(N_per_deg=size, direction=way), {"load": load}
-
-    return name, at
+    return name, acting(load, N_per_deg=SIZE, direction=way)
 
 
 @other_form("cable_pull", READ)
@@ -199,13 +181,10 @@ def cable_pull_of_the_sensor(draw: Draw):
     name, j = draw.joint()
     way = draw.direction()
 
-    def at(size):
-        def sense(run: Run):
-            run.sensed_N = run.sensed_N + size * _travel_deg(run, j)[:, None] * way
+    def sense(run: Run, size: float):
+        run.sensed_N = run.sensed_N + size * _travel_deg(run, j)[:, None] * way
 
-        return numbers(N_per_deg=size, direction=way), {"sense": sense}
-
-    return name, at
+    return name, acting(sense, N_per_deg=SIZE, direction=way)
 
 
 @other_form("cable_pull", PULL)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.plant import memory
-from tests.plant.effects.registry import LIBRARY, Draw, declare, numbers, other_form
+from tests.plant.effects.registry import LIBRARY, SIZE, Draw, acting, declare, numbers, other_form
 from tests.plant.robot import Run, STEP_s
 
 CLOCKS = ("tracker", "force", "controller", "q_load", "q_cmd")
@@ -23,13 +23,10 @@ def clock(draw: Draw):
     target, sign = _late(draw)
     skew = draw.pick([0.0, draw.sign() * draw.log_uniform(5e-5, 5e-4)])
 
-    def at(size):
-        def world(run: Run):
-            run.delay(target, sign * size, skew)
+    def world(run: Run, size: float):
+        run.delay(target, sign * size, skew)
 
-        return numbers(offset_s=sign * size, skew=skew), {"world": world}
-
-    return target, at
+    return target, acting(world, offset_s=lambda size: sign * size, skew=skew)
 
 
 @other_form("clock")
@@ -38,13 +35,10 @@ def clock_that_jumps(draw: Draw):
     target, sign = _late(draw)
     share = draw.uniform(0.3, 0.6)
 
-    def at(size):
-        def sense(run: Run):
-            run.jumps[target] = (share * run.t_s[-1], sign * size)
+    def sense(run: Run, size: float):
+        run.jumps[target] = (share * run.t_s[-1], sign * size)
 
-        return numbers(offset_s=sign * size, from_share=share), {"sense": sense}
-
-    return target, at
+    return target, acting(sense, offset_s=lambda size: sign * size, from_share=share)
 
 
 @declare(LIBRARY, "timing", 0.02, 0.6, signal="tcp")
@@ -67,13 +61,10 @@ def velocity_in_three_averages(draw: Draw):
     """A smoother window, longer or shorter than the controller's."""
     sign = draw.sign()
 
-    def at(size):
-        def world(run: Run):
-            run.believed = run.believed.but(k_s=0.168 * (1.0 + sign * size), ramp="three_averages")
+    def world(run: Run, size: float):
+        run.believed = run.believed.but(k_s=0.168 * (1.0 + sign * size), ramp="three_averages")
 
-        return numbers(k_s=0.168 * (1.0 + sign * size), window="two averages of k/2"), {"world": world}
-
-    return None, at
+    return None, acting(world, k_s=lambda size: 0.168 * (1.0 + sign * size), window="two averages of k/2")
 
 
 def _corners(size: float, shape: str):
@@ -143,29 +134,23 @@ def advance_crawl(draw: Draw):
     """The advance run is late and the move before some corners is driven slower, without a stop."""
     count, seed = int(draw.rng.integers(1, 4)), int(draw.rng.integers(1 << 30))
 
-    def at(size):
-        def world(run: Run):
-            rows = blended_rows(run, count, seed)
-            speed = run.way.speed_mm_s.copy()
-            speed[rows] *= 1.0 / (1.0 + size)
-            run.way = replace(run.way, speed_mm_s=speed)
+    def world(run: Run, size: float):
+        rows = blended_rows(run, count, seed)
+        speed = run.way.speed_mm_s.copy()
+        speed[rows] *= 1.0 / (1.0 + size)
+        run.way = replace(run.way, speed_mm_s=speed)
 
-        return numbers(count=count, slower=1.0 / (1.0 + size)), {"world": world}
-
-    return None, at
+    return None, acting(world, count=count, slower=lambda size: 1.0 / (1.0 + size))
 
 
 @declare(LIBRARY, "servo", 0.001, 0.03)
 def servo_lag(draw: Draw):
     name, axes = draw.axes()
 
-    def at(size):
-        def lags(run: Run):
-            run.lag_s[:, axes] += size
+    def lags(run: Run, size: float):
+        run.lag_s[:, axes] += size
 
-        return numbers(tau_s=size), {"lags": lags}
-
-    return name, at
+    return name, acting(lags, tau_s=SIZE)
 
 
 @other_form("servo_lag")
@@ -174,14 +159,11 @@ def servo_lag_with_pose(draw: Draw):
     name, j = draw.joint()
     slope = draw.sign() * draw.uniform(0.8, 1.6)
 
-    def at(size):
-        def lags(run: Run):
-            stretch = run.q_cmd[:, 2] - np.pi / 2.0 - 0.6 if j < 3 else run.q_cmd[:, 4] + 0.8
-            run.lag_s[:, j] += size * np.maximum(1.0 + slope * stretch, 0.1)
+    def lags(run: Run, size: float):
+        stretch = run.q_cmd[:, 2] - np.pi / 2.0 - 0.6 if j < 3 else run.q_cmd[:, 4] + 0.8
+        run.lag_s[:, j] += size * np.maximum(1.0 + slope * stretch, 0.1)
 
-        return numbers(tau_s=size, with_pose=slope), {"lags": lags}
-
-    return name, at
+    return name, acting(lags, tau_s=SIZE, with_pose=slope)
 
 
 @other_form("servo_lag")

@@ -131,7 +131,7 @@ def window(content, browser, tmp_path_factory):
 
 @pytest.mark.browser
 def test_its_volume_is_that_of_the_machined_stock(window, prediction):
-    left = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False).left
+    left = remove(prediction.toolpath, prediction.motion, prediction.cell, is_checked=False).material
     window.evaluate(FINISHED, True)
     assert window.evaluate(VOLUME) == pytest.approx(left.volume_mm3, rel=0.005)
 
