@@ -149,8 +149,12 @@ INPUTS = {
     "own_torque_memory": {"own torque"},
     "force_memory": {"force"},
     "jerk": {"jerk", "acceleration"},
+    "noise": {TIME},
 }
-"""Input in the words of a label -> ``on``; the others differ by their spaces alone."""
+"""Input in the words of a label -> ``on``; the others differ by their spaces alone. What is random has a
+course of its own in each run: that is time in the run."""
+MOST_OF = 0.5
+"""Of a link's gap: on what less of it depends is an aside, however sure, and not what the gap depends on."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +174,12 @@ class Said:
     on: str
     form: str | None
     probability: float
+    """Of it, or of the set that is declared with it."""
     place_probability: float
+    share: float = 1.0
+    """Of the gap of its link."""
+    alike: tuple[tuple[str, str], ...] = ()
+    """Place and input of what it declares indistinguishable from it."""
 
 
 @dataclass(frozen=True)
@@ -190,8 +199,10 @@ NOTHING = Told(False, False, False)
 def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
     """Compare the most probable dependence that an answer states with those that the label allows.
 
-    A named cause states its own family; a dependence of the rest counts where nothing is named. Its place has
-    a probability of its own, and may be stated where the input is not. None where the label knows none.
+    One of its declared set counts as right; what takes little of its link's gap counts only where nothing
+    else is stated. A named cause states its own family; a dependence of the rest counts where nothing is
+    named. Its place has a probability of its own, and may be stated where the input is not. None where the
+    label knows none.
     """
     allowed = allowed_by(entry)
     if allowed is None:
@@ -199,11 +210,12 @@ def told(entry: dict[str, Any], result: dict[str, Any]) -> Told | None:
     stated = [*_of_causes(named_of(result))] or [*_of_rest(result)]
     if not stated:
         return NOTHING
-    best = max(stated, key=lambda each: each.probability)
-    if best.probability >= STATED:
-        return _compared(best, allowed)
+    sure = [each for each in stated if each.probability >= STATED]
+    if sure:
+        most = [each for each in sure if each.share >= MOST_OF]
+        return _compared(max(most or sure, key=lambda each: each.probability), allowed)
     best = max(stated, key=lambda each: each.place_probability)
-    return Told(best.place_probability >= STATED and best.at in allowed.at, False, False)
+    return Told(best.place_probability >= STATED and _compared(best, allowed).place, False, False)
 
 
 def located(entries: Sequence[dict[str, Any]], result: dict[str, Any]) -> bool:
@@ -259,7 +271,9 @@ def allowed_by(entry: dict[str, Any]) -> Allowed | None:
 def _of_rest(result: dict[str, Any]) -> Iterable[Said]:
     for each in result["unexplained"].get("depends_on") or ():
         place = each.get("place_probability") or each["probability"]  # an impulse has one for both
-        yield Said(each["at"], each["on"], each["form"], each["probability"], place)
+        of_set = each.get("set_probability") or each["probability"]
+        alike = tuple((other["at"], other["on"]) for other in each.get("indistinguishable_from") or ())
+        yield Said(each["at"], each["on"], each["form"], of_set, place, each["share"] or 0.0, alike)
 
 
 def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:
@@ -270,9 +284,10 @@ def _of_causes(causes: Iterable[dict[str, Any]]) -> Iterable[Said]:
 
 
 def _compared(said: Said, allowed: Allowed) -> Told:
-    place = said.at in allowed.at
-    family = place and said.on in allowed.on
-    return Told(place, family, family and said.form in (None, allowed.form))
+    there = [(at, on) for at, on in ((said.at, said.on), *said.alike) if at in allowed.at]
+    family = any(on in allowed.on for _, on in there)
+    is_first = said.at in allowed.at and said.on in allowed.on
+    return Told(bool(there), family, is_first and said.form in (None, allowed.form))
 
 
 CLOSE_s = 0.02

@@ -44,6 +44,7 @@ class Dependence(Enum):
     VELOCITY = "velocity"
     """How fast the signal itself changes: a joint, the tip, or a force."""
     ACCELERATION = "acceleration"
+    """Also what rings with it: the mode of a spring."""
     JERK = "jerk"
     """Commanded: what a servo is behind or ahead where the acceleration changes."""
     FORCE = "force"

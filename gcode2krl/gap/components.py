@@ -21,7 +21,7 @@ from gcode2krl.arrays import Floats
 from gcode2krl.effects import Applied, Effect, Parameter
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.errors import Gcode2KrlError
-from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.compare.inputs import RINGS_HZ, SWINGS_HZ, Admissible
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -482,6 +482,8 @@ class Grid:
                 yield from self._of_the_pose(place)
             elif place.width > 1:
                 yield from self._of_the_signal(place)
+            if place.width > 1 and on in (None, Dependence.ACCELERATION):
+                yield self._of_swings(place, RINGS_HZ if place.where is Where.TIP else SWINGS_HZ)
         if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN):
             yield from self._of_the_plan(self._timing)
 
@@ -496,10 +498,12 @@ class Grid:
             yield from self._of_joint(place.joint)
         if any(each.force_N.any() for each in inputs):
             yield from self._of_force
+            yield Dependence.METRES_CUT, self._of_metres_cut(place)
         if place.joint is None:
             yield Dependence.PLACE, smooth_sum([each.position_mm for each in inputs])
         if place.where is Where.FORCE_AXIS:
             yield Dependence.PLACE, free(self._pose(turned=True))
+            yield Dependence.REVERSALS, free([each.drags for each in inputs])
         elif place.where is Where.JOINT:
             yield Dependence.PLACE, self._of_position
 
@@ -546,6 +550,7 @@ class Grid:
                 Dependence.ACCELERATION,
                 smooth([each.acceleration_rad_s2[:, place.joint] for each in inputs]),
             )
+            yield Dependence.ACCELERATION, free([each.rings(place.joint) for each in inputs])
             if self.traces[0].link.of_joints:  # behind the arm's modes a jerk is no function any more
                 yield Dependence.JERK, free([each.jerk(place.joint) for each in inputs])
             return
@@ -588,12 +593,19 @@ class Grid:
         yield Dependence.FORCE, free(columns)
         place_ = polynomials([each.position_mm for each in inputs], 1)
         yield Dependence.FORCE_BY_PLACE, free(products(force, place_))
+
+    def _of_metres_cut(self, place: Place) -> Functions:
+        """Return what grows with the metres cut: the force and, of the tip, a wear or a slip of its own.
+
+        An encoder or a sensor in air knows of no cut.
+        """
+        inputs = self.inputs
+        force = [each.force_N for each in inputs]
         cut = polynomials([each.cut_m[:, None] for each in inputs], 2)
-        grows = products(force, [each[:, 1:] for each in cut])
-        yield (
-            Dependence.METRES_CUT,
-            free([np.concatenate(pair, axis=1) for pair in zip(grows, force, cut, strict=True)]),
-        )
+        parts = [products(force, [each[:, 1:] for each in cut]), force]
+        if place.where is Where.TIP:
+            parts.append(cut)
+        return free([np.concatenate(each, axis=1) for each in zip(*parts, strict=True)])
 
     def _pose(self, turned: bool) -> list[Floats]:
         """Return low polynomials of the position, with the axes of the tool where they matter."""
@@ -620,6 +632,11 @@ class Grid:
         if used.any():
             loops = _scaled([each[:, :, used] for each in wide], sigma)
             yield Family(place, Dependence.FORCE, loops, (np.eye(loops[0].shape[2]),))
+
+    def _of_swings(self, place: Place, modes_hz: Sequence[float]) -> Family:
+        """Return what swings behind the tip's acceleration, each axis and mode by itself."""
+        swings = _scaled([each.swings(modes_hz) for each in self.inputs], float(np.mean(self._sigma)))
+        return Family(place, Dependence.ACCELERATION, swings, (np.eye(swings[0].shape[2]),))
 
     def _of_the_plan(self, place: Place) -> Iterator[Family]:
         """Yield what a controller makes of corners, speeds and stops by laws of its own."""

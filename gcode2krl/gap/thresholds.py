@@ -699,6 +699,9 @@ class PosteriorThresholds:
         "times the odds that a family is right, those that its place is: of 75 families below .3 the place "
         "of 34 was right, of 191 above that of 180",
     )
+    most_alike_families: int = convention(
+        2, "families that are declared beside the best one: a set of more than three tells nothing"
+    )
     least_unknown: float = convention(0.02, "no probability is nearer to 0 or 1: nothing is certain")
 
     # Naming

@@ -137,10 +137,26 @@ def test_every_word_of_the_plant_is_one_of_the_answer():
     from tests.plant.effects.depends import ON, WHERE
 
     known = {each.value for each in Dependence}
-    for on in set(ON) - {"noise"}:
+    for on in ON:
         entry = effect(depends={"where": "tip", "joints": [], "on": [on], "form": "smooth"})
         assert dependences.allowed_by(entry).on & known, on
     assert set(WHERE) == {*dependences.PLACES, "joint"}
+
+
+def test_one_of_the_declared_set_is_right():
+    alike = [{"kind": "unknown", "at": "A2", "on": "velocity"}]
+    of_set = depends("A3", "velocity", probability=0.3)
+    of_set |= {"indistinguishable_from": alike, "set_probability": 0.6}
+    label = effect(depends={"where": "joint", "joints": ["A2"], "on": ["velocity"], "form": "smooth"})
+    assert told(label, rest=[of_set]) == (True, True, False)
+    assert told(label, rest=[of_set | {"set_probability": 0.4}])[1] is False
+    assert told(effect(), rest=[of_set]) == (True, False, False)
+
+
+def test_what_takes_little_of_its_gap_is_an_aside():
+    aside = depends("A2", "time in the run", "impulse", probability=0.95, share=0.01)
+    assert told(effect(), rest=[aside, depends()]) == (True, True, True)
+    assert told(effect(), rest=[aside]) == (True, False, False)
 
 
 def test_a_label_without_dependences_is_not_scored():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from gcode2krl.gap.compare.inputs import Admissible
 from tests.gap.constructed import motion, trace
@@ -51,6 +52,30 @@ def test_directions_are_those_of_each_joint():
     rates = np.gradient(motion().q_cmd_rad, motion().time_s, axis=0)
     fast = np.abs(rates) > 0.3 * np.abs(rates).max(axis=0)
     np.testing.assert_array_equal(inputs_of().directions[fast], np.sign(rates[fast]))
+
+
+def test_friction_fades_and_cables_drag_by_the_angle():
+    own, t_s = inputs_of(), motion().time_s
+    direction = own.directions
+    for column, tau_s in zip(own.reversals(0).T[-3:], (2.0, 8.0, 30.0), strict=True):
+        np.testing.assert_allclose(column, direction[:, 0] * np.exp(-(t_s - t_s[0]) / tau_s))
+    np.testing.assert_array_equal(own.drags[:, :6], direction)
+    moves = np.flatnonzero(np.ptp(motion().q_cmd_rad, axis=0) > 1e-3)
+    angle = motion().q_cmd_rad - motion().q_cmd_rad.mean(axis=0)
+    for power in (1, 2):
+        drags = own.drags[:, 6 * power : 6 * power + 6] * direction
+        for joint in moves:
+            assert np.corrcoef(drags[:, joint], angle[:, joint] ** power)[0, 1] == pytest.approx(1.0)
+
+
+def test_a_joint_at_a_spring_follows_as_an_oscillator_does():
+    t_s, q = motion().time_s, motion().q_cmd_rad[:, 0]
+    rings = inputs_of().rings(0)
+    for column in (0, 3):
+        w = 2.0 * np.pi * 7.0 * 1.12**column
+        _, moved, _ = signal.lsim(([w * w], [1.0, 2.0 * 0.04 * w, w * w]), q - q[0], t_s)
+        behind = moved - (q - q[0])
+        np.testing.assert_allclose(rings[:, column], behind, atol=0.1 * np.abs(behind).max())
 
 
 def test_without_a_force_nothing_presses_and_without_a_thermometer_there_is_no_temperature():

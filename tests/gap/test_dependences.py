@@ -1,9 +1,13 @@
 """On what a gap without a name depends, as the answer states it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from gcode2krl.gap.answer.assembly import _dependences
 from gcode2krl.gap.answer.causes import depends_on
+from gcode2krl.gap.compare.trace import Event, Whose
 from gcode2krl.gap.posterior.calibrated import family_features
 from gcode2krl.gap.posterior.judgement import judge
 from tests.gap import constructed as c
@@ -38,6 +42,15 @@ def test_a_step_has_its_run_moment_and_height():
     assert best.tests == family_features(found.rest, found.rest.study.evidences[0]).as_dict()
     assert best.share > 0.9
     assert best.direction is None
+
+
+def test_impulses_of_a_link_make_its_family_no_less_sure():
+    plain = servo(lambda run, t: 2.0 * np.sin(2.0 * np.pi * 5.3 * t))
+    hit = Event("servo", "run-1", Whose.IMPULSE, (4.2, 4.3), 4.25, 9, np.ones(1), np.zeros(1), 5.0)
+    struck = replace(plain, every=(replace(plain.every[0], events=(hit,)), *plain.every[1:]))
+    (impulse, _), (with_it, _), *_ = _dependences([struck])
+    assert impulse.form == "impulse"
+    assert with_it.probability == next(_dependences([plain]))[0].probability
 
 
 def test_a_tone_is_periodic():

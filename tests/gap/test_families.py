@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.gap.compare.inputs import Admissible
@@ -126,6 +127,7 @@ def _step(own, run):
         ("own angle|acceleration", lambda own, run: 3.0 * np.sin(40.0 * own.q_rad[:, 0])),
         ("velocity", lambda own, run: 8.0 * own.rate_rad_s[:, 0]),
         ("reversals", lambda own, run: 0.7 * np.sign(own.rate_rad_s[:, 0])),
+        ("reversals", lambda own, run: np.sign(own.rate_rad_s[:, 0]) * np.exp(-own.since_start_s / 4.0)),
         ("run to run", lambda own, run: (1.0, -0.8, 0.4)[run] + 0.0 * own.hours),
         ("step in time", _step),
         ("tone", lambda own, run: np.sin(2.0 * np.pi * 3.3 * own.since_start_s + run)),
@@ -210,6 +212,40 @@ def test_a_force_sensor_with_a_loop_depends_on_the_force():
     assert best.evidences[0].on is Dependence.FORCE
     (other, *_) = [each for each in best.evidences if each.on is not Dependence.FORCE]
     assert best.evidences[0].nats > 1.2 * other.nats
+
+
+def test_a_hose_that_swings_depends_on_the_acceleration():
+    """A pendulum of 0.5 m behind the tip, along x."""
+
+    def pull(blank):
+        at = blank.inputs.position_mm[:, 0] - blank.inputs.position_mm[0, 0]
+        w = (9.81 / 0.5) ** 0.5
+        _, hung, _ = signal.lsim(([w * w], [1.0, 0.12 * w, w * w]), at, blank.inputs.time_s)
+        return np.outer(6.0 * (hung - at) / np.std(hung - at), [1.0, 0.0, 0.0])
+
+    best = force_study(pull).evidences[0]
+    assert (best.place.name, best.on) == ("force", Dependence.ACCELERATION)
+
+
+def test_a_cable_that_drags_depends_on_reversals():
+    def drag(blank):
+        q = blank.inputs.q_cmd_rad[:, 0]
+        angle = (q - q.min()) / np.ptp(q)
+        return np.outer(12.0 * angle**2 * np.sign(np.gradient(q)), [0.0, 1.0, 0.0])
+
+    best = force_study(drag).evidences[0]
+    assert (best.place.name, best.on) == ("force", Dependence.REVERSALS)
+
+
+@pytest.mark.parametrize(("link", "place"), [("mechanics", "tip"), ("force", "force")])
+def test_metres_cut_move_the_tip_and_in_air_no_force(link, place):
+    own = force_inputs()
+    own.force_base_N[:200] = 0.0
+    traces = [c.trace(np.zeros((COUNT, 3)), link, 0, own)]
+    families = Grid(traces, [1.0] * 3).families(Dependence.METRES_CUT)
+    cut = next(family for family in families if family.on is Dependence.METRES_CUT)
+    assert cut.place.name == place
+    assert cut.columns[0][:, :199].any() == (place == "tip")
 
 
 @pytest.mark.parametrize("share", [0.03, 0.3])

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from gcode2krl.effects.dependence import Dependence
 from gcode2krl.gap.posterior.calibrated import family_probabilities, probabilities_table
 from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.thresholds import declared_nats
 from tests.gap import constructed as c
 
 SIGMA = 1e-4
@@ -66,3 +68,19 @@ def test_a_place_is_at_least_as_probable_as_its_families_and_excludes_other_plac
         assert len({each.place_probability for each in there}) == 1
         assert there[0].place_probability >= min(sum(each.probability for each in there), 0.98)
         assert there[0].place_probability > there[0].probability
+
+
+def test_what_the_data_do_not_tell_apart_is_a_set():
+    """A weak drift of both runs may be one of each."""
+    first, *others = told([0.3 * np.tanh((TIME_S - 6.0) / 3.0)])
+    assert [each.told for each in first.alike] == [("A1", Dependence.RUN_TIME)]
+    assert first.set_probability > first.probability
+    assert all(each.set_probability == 0.0 for each in others)
+    assert len({each.told for each in (first.evidence, *first.alike)}) == 1 + len(first.alike)
+    for each in first.alike:
+        assert first.evidence.nats - each.nats < declared_nats() * first.evidence.inflation
+
+
+def test_a_step_and_a_drift_are_told_as_one_input():
+    of_time = [each for each in told([STEP]) if each.evidence.told == ("A1", Dependence.RUN_TIME)]
+    assert {each.evidence.on for each in of_time} == {Dependence.RUN_TIME, Dependence.RUN_TIME_STEP}

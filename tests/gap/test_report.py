@@ -4,7 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from gcode2krl.gap.answer.result import EffectAt, EventResult, Expectation, NextRun, RunSize, Separates, Where
+from gcode2krl.gap.answer.result import (
+    EffectAt,
+    EventResult,
+    Expectation,
+    NextRun,
+    RunSize,
+    Separates,
+    UnknownAt,
+    Where,
+)
 from gcode2krl.gap.answer.words import headline, left_lines, text_report, where_words, worst
 from tests.gap.answered import BACKLASH, GAP, STRETCH, UNEXPLAINED, UNSURE
 
@@ -60,6 +69,16 @@ def test_what_is_left_is_said_by_what_it_depends_on():
     assert list(left_lines(UNEXPLAINED)) == [
         "0.93 tip, a step from 11.2 s of run-1 on, 0.14 mm along (0.9, 0.3, 0.1); takes 88% of the gap"
     ]
+    drift = replace(
+        UNEXPLAINED.unexplained.depends_on[0],
+        probability=0.4,
+        indistinguishable_from=(UnknownAt(at="A4", on="wall clock"), UnknownAt(at="tip", on="travel")),
+        set_probability=0.7,
+    )
+    gap = replace(UNEXPLAINED, unexplained=replace(UNEXPLAINED.unexplained, depends_on=(drift,)))
+    assert list(left_lines(gap))[1] == (
+        "     0.70 that or what these data cannot tell from it: A4, wall clock or tip, travel"
+    )
     assert "what is left depends on" in text_report(UNEXPLAINED).splitlines()
     assert "what is left depends on" not in text_report(GAP)
 

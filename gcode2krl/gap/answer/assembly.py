@@ -261,7 +261,7 @@ def _dependences(signals: Sequence[Judgement]) -> Iterator[tuple[DependsOnResult
         of_link: list[tuple[DependsOnResult, Evidence | None]] = [
             (each, None) for each in impulses_of(judgement)
         ]
-        of_link += depends_on(judgement, larger_links=len(links | {each.link for each, _ in of_link}))
+        of_link += depends_on(judgement, larger_links=len(links))  # its own impulses are no other gap
         links |= {each.link for each, _ in of_link}
         yield from of_link
 

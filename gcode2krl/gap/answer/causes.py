@@ -318,7 +318,7 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[De
     if not (rest.worth_naming or rest.is_gap):
         return
     for family in family_probabilities(rest, larger_links):
-        if family.probability >= _LIMITS.least_probability:
+        if max(family.probability, family.set_probability) >= _LIMITS.least_probability:
             yield _result(judgement, family), family.evidence
 
 
@@ -345,10 +345,14 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
     return DependsOnResult(
         link=judgement.link.name,
         at=_at(evidence, evidence.signal),
-        on=(Dependence.RUN_TIME if is_step else evidence.on).value,
+        on=evidence.told[1].value,
         form=_FORMS.get(evidence.on, "smooth"),
         probability=family.probability,
         place_probability=family.place_probability,
+        indistinguishable_from=tuple(
+            UnknownAt(at=_at(each, each.signal), on=each.told[1].value) for each in family.alike
+        ),
+        set_probability=family.set_probability or None,
         share=family.features.share,
         tests=family.features.as_dict(),
         at_time_s=None if moment is None else moment.t_s,

@@ -354,7 +354,11 @@ class DependsOnResult:
     tests: Mapping[str, float | None] | None = None
     """Name -> number: what its probability is made of (`posterior.calibrated.FamilyFeatures`)."""
     place_probability: float | None = None
-    """That its place is right, whatever the gap depends on there."""
+    """That its place, or one of its set's, is right, whatever the gap depends on there."""
+    indistinguishable_from: tuple[UnknownAt, ...] = ()
+    """Places and inputs that these data cannot tell from it."""
+    set_probability: float | None = None
+    """That it or one of these is right; None of an impulse, and of all but the first of a signal."""
 
 
 @dataclass(frozen=True, kw_only=True)

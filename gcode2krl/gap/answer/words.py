@@ -604,6 +604,10 @@ def left_lines(gap: Gap) -> Iterator[str]:
         aside = "" if place is None else f", the place alone {place:.2f}"
         share = f"takes {dependence.share:.0%} of the gap"
         yield f"{dependence.probability:.2f}{aside} {depends(dependence)}; {share}"
+        if dependence.indistinguishable_from:
+            others = listed([f"{each.at}, {each.on}" for each in dependence.indistinguishable_from], "or")
+            of_set = dependence.set_probability or dependence.probability
+            yield f"     {of_set:.2f} that or what these data cannot tell from it: {others}"
 
 
 def _link(link: LinkResult) -> str:

@@ -11,6 +11,7 @@ distance d larger by δ takes δ·|1/v₁ - 1/v₂| more where the speed changes
 has more of the way; a ramp of dv takes (|dv|/a + k)/2; a stop takes what it takes.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +20,7 @@ import numpy as np
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import arm
 from gcode2krl.effects.inputs import Inputs, gradient
-from gcode2krl.effects.operators import lag, play, since_reversal
+from gcode2krl.effects.operators import lag, play, second_order, since_reversal
 from gcode2krl.gap.compare.interpolation import linear, nearest_rows
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -126,8 +127,14 @@ _SETTLES_S = (0.05, 0.3)
 """After a reversal: a stick-slip spike, and what an arm needs to come to rest."""
 _FOLLOWS_S = (0.004, 0.01, 0.025)
 """Time constants of a servo's two lags behind a jerk."""
+RINGS_HZ = tuple(7.0 * 1.12**i for i in range(12))
+"""Modes of arms and belts, 7 to 25 Hz, each as far from the next as its peak is wide."""
+SWINGS_HZ = tuple(0.4 * 1.12**i for i in range(12))
+"""What hangs at the arm: a bow of 1.5 to 0.1 m swings as a pendulum does, at 0.4 to 1.4 Hz."""
+_RINGS_DAMPING = 0.04
+"""Of such modes, 1 to 6 %, and of hoses up to 10 %."""
 _WARMS_S = (2.0, 8.0, 30.0)
-"""Time constants with which a spindle grows after it has started."""
+"""Time constants with which a spindle grows after it has started, and friction falls as it warms."""
 _PLAYS_LOAD = (0.025, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Widths of play of a torque or a force, over its range; a sum of plays is any smooth loop."""
 _LATE_S = tuple(0.002 * 1.4**i for i in range(14))
@@ -288,6 +295,22 @@ class Admissible:
         follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]
         return self._at(np.stack(follows, axis=1))
 
+    def rings(self, joint: int) -> Floats:
+        """Return how far a joint that hangs at a spring swings from its command (n, c), by its mode."""
+        return self._swings(self.trace.inputs.q_cmd_rad[:, joint], RINGS_HZ)
+
+    def swings(self, modes_hz: Sequence[float]) -> Floats:
+        """Return the same of what hangs at the tip, along each axis of ``$BASE`` by itself, (k, n, 3·c)."""
+        columns = []
+        for axis, place_mm in zip(np.eye(3), self.trace.inputs.position_mm.T, strict=True):
+            columns += [self.as_stated(own[:, None] * axis) for own in self._swings(place_mm, modes_hz).T]
+        return np.stack(columns, axis=2).swapaxes(0, 1)[list(self.trace.columns)]
+
+    def _swings(self, values: Floats, modes_hz: Sequence[float]) -> Floats:
+        time_s, values = self.trace.inputs.time_s, np.ascontiguousarray(values)
+        follows = [second_order(values, time_s, hz, _RINGS_DAMPING) for hz in modes_hz]
+        return self._at(np.stack(follows, axis=1) - values[:, None])
+
     @cached_property
     def torque_Nm(self) -> Floats:
         """(n, 6) as logged or, beside a prediction, of all nominal loads: what the gears carry."""
@@ -339,7 +362,8 @@ class Admissible:
     def reversals(self, joint: int) -> Floats:
         """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.
 
-        Beside them what dies down after each reversal, and what grows with the joint's load.
+        Beside them what dies down after each reversal, what grows with the joint's load, and what fades as
+        grease and brakes warm.
         """
         inputs = self.trace.inputs
         q = np.ascontiguousarray(inputs.q_cmd_rad[:, joint])
@@ -348,7 +372,18 @@ class Admissible:
         settling = [direction * np.exp(-since_s / tau) for tau in _SETTLES_S]
         load = np.abs(self._torque[:, joint])
         loaded = direction * load / max(float(load.max(initial=0.0)), 1e-12)
-        return np.stack([direction, *plays, *settling, loaded], axis=1)[self._nearest]
+        fades = [direction * np.exp((inputs.time_s[0] - inputs.time_s) / tau) for tau in _WARMS_S]
+        return np.stack([direction, *plays, *settling, loaded, *fades], axis=1)[self._nearest]
+
+    @cached_property
+    def drags(self) -> Floats:
+        """(n, 18) the direction of each joint's motion, alone, times its angle, and times its square.
+
+        So hoses and cables drag that hang at a joint.
+        """
+        reach = np.maximum(np.ptp(self.q_rad, axis=0), _LIMITS.still_rad_s)
+        angle = (self.q_rad - self.q_rad.mean(axis=0)) / reach
+        return np.concatenate([self.directions * angle**power for power in range(3)], axis=1)
 
 
 def _plays(values: Floats) -> Floats:

@@ -26,7 +26,7 @@ from gcode2krl.effects import Role
 from gcode2krl.gap.posterior.cause_tests import Constancy, FamilyTests, Interval, Rest
 from gcode2krl.gap.posterior.examination import Examination
 from gcode2krl.gap.posterior.families import Evidence
-from gcode2krl.gap.thresholds import THRESHOLDS, stated_table
+from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats, stated_table
 
 _LIMITS = THRESHOLDS.posterior
 MOST_NATS = 1000.0
@@ -108,17 +108,31 @@ class FamilyFeatures:
 FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 
-def family_features(rest: Rest, evidence: Evidence, larger_links: int = 0) -> FamilyFeatures:
-    """Return the features of a family of a rest; those of other signals, of another joint, are no rivals."""
+def family_features(
+    rest: Rest, evidence: Evidence, larger_links: int = 0, alike: Sequence[Evidence] = ()
+) -> FamilyFeatures:
+    """Return the features of a family of a rest, or of the set of it and those that are ``alike``.
+
+    No rivals are the families of other signals, of another joint, and another form of the same input.
+    """
     rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
-    other = max((each.nats for each in rivals if each is not evidence), default=0.0)
+    told = {each.told for each in (evidence, *alike)}
+    other = max((each.nats for each in rivals if each.told not in told), default=0.0)
     return FamilyFeatures(
-        lead_nats=_within((evidence.nats - max(other, 0.0)) / rivals[0].inflation),
+        lead_nats=_within((evidence.nats - max(other, 0.0)) / _scatter(rivals[0])),
         share=rest.share(evidence),
         p=rest.study.p_of(evidence),
         of_largest=min(max(evidence.nats, 0.0) / max(rest.study.evidences[0].nats, 1.0), 1.0),
         larger_links=larger_links,
     )
+
+
+def _scatter(first: Evidence) -> float:
+    """Return by how much evidence scatters: its inflation, at most what a family is off by.
+
+    What happens in few stretches leaves much in them whatever its family, and inflates it without bound.
+    """
+    return min(first.inflation, max(1.0, _LIMITS.ahead_share * first.nats))
 
 
 @dataclass(frozen=True)
@@ -368,7 +382,11 @@ class FamilyProbability:
     features: FamilyFeatures
     probability: float
     place_probability: float
-    """That its place is right, whatever the gap depends on there."""
+    """That its place is right, whatever the gap depends on there; or one of the places of its set."""
+    alike: tuple[Evidence, ...] = ()
+    """Families that the data do not tell from it."""
+    set_probability: float = 0.0
+    """That it or one of these is the right one; 0 of all but the first."""
 
 
 def family_probabilities(rest: Rest, larger_links: int = 0) -> list[FamilyProbability]:
@@ -395,6 +413,7 @@ def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbabil
     return replace(
         told,
         probability=min(told.probability, 1.0 - whole.probability),
+        set_probability=min(told.set_probability, 1.0 - whole.set_probability),
         place_probability=min(told.place_probability, 1.0 - whole.place_probability),
     )
 
@@ -404,13 +423,19 @@ def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[Fam
     first, *others = [each for each in rest.study.evidences if each.place.component == component]
     features = family_features(rest, first, larger_links)
     own = probabilities_table().dependence(features)
-    behind = np.array([max(first.nats - each.nats, 0.0) / first.inflation for each in others])
+    behind = np.array([max(first.nats - each.nats, 0.0) / _scatter(first) for each in others])
     weights = np.exp(-behind / _LIMITS.temperature)
     shares = np.minimum((1.0 - own) * weights / (1.0 + weights.sum()), own)
+    near: dict[object, Evidence] = {}
+    for each, nats in zip(others, behind, strict=True):
+        if nats < declared_nats() and each.told != first.told:
+            near.setdefault(each.told, each)
+    alike = tuple(near.values())[: _LIMITS.most_alike_families]
+    of_set = max(own, probabilities_table().dependence(family_features(rest, first, larger_links, alike)))
     there = [float(s) for s, each in zip(shares, others, strict=True) if each.place.name == first.place.name]
     at_first = max(_of_place(own), clipped(own + sum(there)))  # one input at a place excludes another
     return [
-        FamilyProbability(first, features, own, at_first),
+        FamilyProbability(first, features, own, max(at_first, _of_place(of_set)), alike, of_set),
         *(
             FamilyProbability(
                 each,

@@ -454,6 +454,12 @@ class Evidence:
         """Return where and on what."""
         return self.place.name, self.on
 
+    @property
+    def told(self) -> tuple[str, Dependence]:
+        """Return the same as an answer tells it: a step is a form of what happens over time."""
+        is_step = self.on is Dependence.RUN_TIME_STEP
+        return self.place.name, Dependence.RUN_TIME if is_step else self.on
+
 
 def evidence_of(
     view: View,

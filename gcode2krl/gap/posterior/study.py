@@ -462,9 +462,15 @@ class Study:
         return _tail_p(np.sqrt(np.maximum(moved, 0.0)), nats**0.5) if len(moved) else 1.0
 
     def p_of(self, evidence: Evidence) -> float:
-        """Return the same of one of its evidences."""
+        """Return p of one of its evidences; of what the command gives most, where runs are moved, too."""
         flipped = np.max(np.stack([each.flipped for each in self.evidences]), axis=0)
-        return _p(flipped, evidence.unbounded)
+        p = _p(flipped, evidence.unbounded)
+        if p <= _LIMITS.significant_p or evidence.on not in _COMMANDED:
+            return p
+        is_most = all(
+            each.unbounded <= evidence.unbounded for each in self.evidences if each.on in _COMMANDED
+        )
+        return min(p, self.command_p) if is_most else p
 
 
 @dataclass

@@ -24,6 +24,8 @@ ON = (
     "force_by_place",
     "metres_cut",
     "travel",
+    "corners",
+    "stops",
     "place",
     "spindle_speed",
     "temperature",
@@ -85,8 +87,8 @@ FRAME = tip("smooth", "place", "constant")
 LIBRARY_DEPENDS: dict[str, Depends | Callable[[str | None], Depends]] = {
     "clock": Depends("clock", ("velocity",), "smooth", ("timing", "servo", "gear", "force", "mechanics")),
     "velocity_rule": timing("smooth", "acceleration"),
-    "corner": timing("smooth", "acceleration", "place"),
-    "advance_stop": timing("step", "time_step"),
+    "corner": timing("smooth", "corners", "acceleration", "place"),
+    "advance_stop": timing("step", "stops", "time_step"),  # a stop is a step in lateness
     "servo_lag": joint("smooth", "velocity", links=("servo",)),
     "backlash": joint("loop", "reversals"),
     "friction": joint("loop", "reversals", links=("servo",)),
