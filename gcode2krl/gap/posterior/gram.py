@@ -361,6 +361,17 @@ class Gram:
         coefficients, _, chi2 = self._fit(free, precision)
         return self.chi2 - chi2, coefficients[self.tangents :]
 
+    def fitted(self, columns: Ints) -> tuple[float, float, Floats]:
+        """Return chi2 with signatures, what all numbers cost as `Fitted.occam`, and their coefficients."""
+        free = np.r_[np.arange(1, 1 + self.tangents), self._at(columns)]
+        precision = np.r_[np.zeros(self.tangents), np.full(len(columns), _PRIOR**-2)]
+        coefficients, b, chi2 = self._fit(free, precision)
+        at = np.r_[free, self._kept + np.flatnonzero(np.abs(b) < MOST)]
+        information = marginal(self.total[np.ix_(at, at)], len(free))
+        grown = np.linalg.slogdet(np.eye(len(free)) + _PRIOR**2 * information)[1]
+        cost = float(grown) + THRESHOLDS.posterior.number_cost * len(free)
+        return chi2, cost, coefficients[self.tangents :]
+
     @cached_property
     def marginal(self) -> Floats:
         """(1 + t + s) squared: inner products under the inverse of I + N·Nᵀ, by Woodbury.

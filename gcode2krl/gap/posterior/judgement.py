@@ -346,7 +346,7 @@ def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Riva
     swaps: dict[Key, Applied] = {}
     while True:
         rivals = {number: rivals_of(examination, number) for number in examination.cause_numbers}
-        better = [(each[0], number) for number, each in rivals.items() if each and each[0].is_better]
+        better = [(each, number) for number, every in rivals.items() for each in every if each.is_better]
         if not better or len(swaps) >= len(examination.causes):
             return examination, rivals, swaps
         best, number = min(better, key=lambda pair: pair[0].cost_difference)

@@ -7,6 +7,11 @@ signature is that of a small effect. Of one that is not proportional to its size
 effect grows: of a force that is 45 ms late to a quarter, and then it compares nothing. So twins are looked
 for where signatures hold, with the effect at a tenth of its size, and refitted whatever their gain.
 
+**Errors of the set-up.** Every arm has some wrong zeros, and a base and a tool that are a little off, so that
+none of them is a rarer cause than another, and several together do what one of another kind does: a frame has
+the form of two wrong zeros. They are chosen as a set, the one of all sets with the most evidence; a cause is
+told from them where no set without it has nearly as much.
+
 **Effects that plan anew.** Their signals are late by seconds, and least squares on them have a minimum at
 each stop. Where little more than noise is left they have one minimum, and a few steps tell what the effect
 can bring.
@@ -18,7 +23,7 @@ would do as well.
 """
 
 import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -365,7 +370,9 @@ def examine(
     still = traces[0].still
     assumed = noise or (noise_of_poses if still else noise_of)(traces, candidates.signatures, nuisance)
     examination = _pruned(
-        _selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed))
+        _with_best_errors(
+            _selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed))
+        )
     )
     if noise is None and examination.causes and not still:
         # what rings or hums looks like noise until its cause is known
@@ -542,6 +549,117 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
     return surprising if sensitivity.left_out_gain(before, _LIMITS.left_out_groups) > 0.0 else None
 
 
+@dataclass(frozen=True)
+class _Errors:
+    """Some errors of a set-up beside accepted effects, to first order."""
+
+    keys: tuple[Key, ...]
+    chi2: float
+    cost: float
+    """What all numbers cost, as chi2."""
+    coefficients: Floats
+    """Of their columns, in this order."""
+
+    def worth(self, spread: float) -> float:
+        """Return twice their evidence, chi2 over its inflation."""
+        return -self.chi2 / spread - self.cost
+
+    def applied(self, columns: Mapping[Key, Column], trace: Trace) -> list[Applied]:
+        """Return the errors at their sizes."""
+        ends = np.cumsum([columns[key].width for key in self.keys])[:-1]
+        sizes = np.split(self.coefficients, ends)
+        return [columns[key].block.applied(x, trace) for key, x in zip(self.keys, sizes, strict=False)]
+
+
+def _errors_of_set_up(examination: Examination) -> dict[Key, Column]:
+    columns = examination.data.candidates.columns
+    return {column.block.key: column for column in columns if column.block.effect.of_set_up}
+
+
+def _accepted_errors(examination: Examination) -> frozenset[int]:
+    """Return which of the accepted effects are errors of the set-up."""
+    applied = enumerate(examination.applied)
+    return frozenset(number for number, each in applied if each.effect.of_set_up)
+
+
+def _errors(gram: Gram, columns: Mapping[Key, Column], keys: Sequence[Key]) -> _Errors:
+    """Return some errors at their best sizes, the accepted effects refitted beside them."""
+    chosen = np.concatenate([np.zeros(0, dtype=int), *(columns[key].index for key in keys)])
+    return _Errors(tuple(keys), *gram.fitted(chosen))
+
+
+def _best_errors(
+    gram: Gram, columns: Mapping[Key, Column], spread: float, needed: frozenset[Key] = frozenset()
+) -> _Errors:
+    """Return the set of errors with the most evidence, from all or few by one put in or left out at a time.
+
+    From few of them a frame comes first, which has the form of two wrong zeros, and then none is missing.
+    """
+    ends = [_climbed(gram, columns, spread, needed, start) for start in (columns.keys(), needed)]
+    return max(ends, key=lambda each: each.worth(spread))
+
+
+def _climbed(
+    gram: Gram, columns: Mapping[Key, Column], spread: float, needed: Set[Key], start: Set[Key]
+) -> _Errors:
+    best = _errors(gram, columns, [key for key in columns if key in start])
+    while True:
+        trials = [
+            _errors(gram, columns, [key for key in columns if (key in best.keys) != (key == other)])
+            for other in columns
+            if other not in needed
+        ]
+        better = max(trials, key=lambda each: each.worth(spread), default=best)
+        if better.worth(spread) <= best.worth(spread):
+            return best
+        best = better
+
+
+def _with_best_errors(examination: Examination) -> Examination:
+    """Return the examination with another set of the set-up's errors, where that is clearly the better one.
+
+    Beside the other accepted effects, or all but one of them: errors together may have the form of what was
+    accepted before them.
+    """
+    columns = _errors_of_set_up(examination)
+    if not columns or not examination.applied:
+        return examination
+    accepted, data = _accepted_errors(examination), examination.data
+    view = data.gram(examination.fitted, without=accepted)
+    spread = view.inflation(np.concatenate([column.index for column in columns.values()]))
+    now = _errors(view, columns, [examination.applied[number].key for number in sorted(accepted)])
+    others = [number for number in range(len(examination.applied)) if number not in accepted]
+    sets = [(accepted, _best_errors(view, columns, spread))]
+    for number in others:
+        view = data.gram(examination.fitted, without={*accepted, number})
+        sets.append((accepted | {number}, _best_errors(view, columns, spread)))
+    taken_out, best = max(sets, key=lambda each: each[1].worth(spread))
+    if best.worth(spread) < now.worth(spread) + 2.0 * declared_nats():
+        return examination
+    changed = _with_errors(examination, taken_out, best.applied(columns, examination.traces[0]))
+    return changed if changed.cost < examination.cost - 2.0 * declared_nats() else examination
+
+
+def _with_errors(
+    examination: Examination, taken_out: Collection[int], errors: Sequence[Applied]
+) -> Examination:
+    """Return the examination with those errors that pass the tests in place of some accepted effects."""
+    kept = [number for number in range(len(examination.applied)) if number not in taken_out]
+    applied = (*(examination.applied[number] for number in kept), *errors)
+    changed = replace(
+        examination,
+        fitted=refit(examination.likelihood, applied),
+        surprises=(*(examination.surprises[number] for number in kept), *(np.inf for _ in errors)),
+        usual=(*(examination.usual[number] for number in kept), *(False for _ in errors)),
+    )
+    for error in errors:
+        number = next(i for i, each in enumerate(changed.applied) if each.key == error.key)
+        others = refit(changed.likelihood, changed.without(number), steps=_PRUNING_STEPS)
+        alone = with_rival(changed, number, changed.applied[number])
+        changed = changed.dropping(number, others) if alone is None else alone
+    return changed
+
+
 def _pruned(examination: Examination) -> Examination:
     """Return the examination without effects that the others may be off by, or that they have made needless.
 
@@ -599,11 +717,18 @@ class Rival:
     chi2_difference: float
     distance2: float = np.inf
     """Square of the distance between both refitted signals, over the power of what the cause does."""
+    beside: tuple[Applied, ...] = ()
+    """Others without which it does not do what the cause does."""
+
+    @property
+    def together(self) -> tuple[Applied, ...]:
+        """Return all effects that stand in place of the cause."""
+        return self.applied, *self.beside
 
     @property
     def is_better(self) -> bool:
-        """Tell whether the rival has more evidence than the cause."""
-        return self.cost_difference < -_SETTLED
+        """Tell whether the rival, a single one, has more evidence than the cause."""
+        return self.cost_difference < -_SETTLED and not self.beside
 
     @property
     def behind_nats(self) -> float:
@@ -639,7 +764,37 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
         apart = examination.likelihood.residual(fitted.applied) - residual
         distance2 = float(apart @ apart) / max(power, 1e-300)
         rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
+    group = _set_up_rival(examination, number, spread)
+    if group is not None and not any(rivals[each.key].alike for each in group.together if each.key in rivals):
+        rivals[group.applied.key] = group
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
+
+
+def _set_up_rival(examination: Examination, number: int, spread: float) -> Rival | None:
+    """Return the errors of the set-up that together do what a cause does; None where data tell it from them.
+
+    Every arm has some of all of them, so that one more is no less probable than the cause. The best set with
+    the cause is compared with the best one without it: the cause is known by what no set takes from it.
+    ``spread`` is the inflation of the cause's gain.
+    """
+    columns = _errors_of_set_up(examination)
+    if not columns:
+        return None
+    key, taken_out = examination.applied[number].key, _accepted_errors(examination)
+    view = examination.data.gram(examination.fitted, without=taken_out)
+    beside = _best_errors(view, columns, spread, needed=frozenset({key} & columns.keys()))
+    if number not in taken_out:
+        view = examination.data.gram(examination.fitted, without={*taken_out, number})
+    others = {each: column for each, column in columns.items() if each != key}
+    instead = _best_errors(view, others, spread)
+    applied = [
+        each for each in instead.applied(columns, examination.traces[0]) if each.key not in beside.keys
+    ]
+    if not applied:
+        return None
+    chi2 = (instead.chi2 - beside.chi2) / spread
+    rival = Rival(applied[0], chi2 + instead.cost - beside.cost, chi2, beside=tuple(applied[1:]))
+    return rival if rival.alike else None
 
 
 def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[Applied]:
@@ -647,7 +802,7 @@ def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[A
 
     The gain of both is beside the others refitted: one that does much the same as another gains little.
     """
-    gram = examination.data.gram(examination.fitted, without=number)
+    gram = examination.data.gram(examination.fitted, without=(number,))
     gain = gram.chi2 - examination.fitted.chi2
     candidates = examination.data.candidates
     columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]

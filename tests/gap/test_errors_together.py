@@ -1,0 +1,102 @@
+"""Errors of a set-up compete as sets: the best one is found, and what cannot be told from it is declared."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from gcode2krl.effects import Parameter
+from gcode2krl.gap.posterior.selection import _best_errors, _errors, _errors_of_set_up, rivals_of
+from tests.gap.constructed import Added, examined, motion, noise, trace, wave
+
+SIGMA = 1e-4
+TIME_S = motion().time_s
+FORMS = [wave(hz).form(TIME_S) for hz in (2.0, 3.0, 4.0)]
+"""Orthogonal, of equal power."""
+
+
+PLAIN = {"nominal": 0.0, "start": 1.0, "source": "a test", "linear": True}
+
+
+class Error(Added):
+    """A wrong zero: a sum of the forms."""
+
+    of_set_up = "small"
+
+    def __init__(self, name, *weights):
+        super().__init__(name, lambda t: sum(w * form for w, form in zip(weights, FORMS, strict=True)))
+
+
+class Moved(Added):
+    """A frame: each of the forms by a number of its own."""
+
+    of_set_up = "frame"
+
+    def __init__(self, name="frame"):
+        super().__init__(name, None)
+        size = self.parameters[0]
+        names = [f"size_{i}_rad" for i in range(len(FORMS))]
+        self.parameters = tuple(Parameter(name, size.unit, size.low, size.high, **PLAIN) for name in names)
+
+    def servo(self, q_act_rad, inputs, applied):
+        q = np.array(q_act_rad)
+        for name, form in zip(self.names, FORMS, strict=True):
+            q[:, 0] += applied[name] * form
+        return q
+
+
+FIRST, SECOND, THIRD = (
+    Error("first", 1.0, 0.5, 0.0),
+    Error("second", 0.0, 1.0, 0.5),
+    Error("third", 0.5, 0.0, 1.0),
+)
+FRAME = Moved()
+
+
+def seen(seed, *weights, effects=(FIRST, SECOND, THIRD, FRAME)):
+    """Return the examination of a sum of the forms, in units of sigma."""
+    y = SIGMA * sum(w * form for w, form in zip(weights, FORMS, strict=True))
+    return examined([trace(y[:, None] + noise(len(y), seed, SIGMA))], list(effects), SIGMA)
+
+
+def names(applied):
+    return {each.effect.name for each in applied}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_best_set_is_that_of_all_sets(seed):
+    made = seen(seed, *np.random.default_rng(seed).uniform(-3.0, 3.0, 3))
+    columns = _errors_of_set_up(made)
+    assert len(columns) == 4
+    view = made.data.gram(made.fitted, without=range(len(made.applied)))
+    every = [
+        _errors(view, columns, keys) for count in range(5) for keys in itertools.combinations(columns, count)
+    ]
+    best = max(every, key=lambda each: each.worth(1.0))
+    assert _best_errors(view, columns, 1.0).worth(1.0) == pytest.approx(best.worth(1.0))
+
+
+def test_two_wrong_zeros_are_found_where_a_frame_comes_first():
+    made = seen(5, 2.0, 3.0, 1.0)  # twice the first and twice the second
+    assert names(made.applied) == {"first", "second"}
+    for each in made.applied:
+        assert each["size_rad"] == pytest.approx(2.0 * SIGMA, rel=0.1)
+
+
+def test_zeros_that_do_together_what_a_frame_does_are_declared_with_it():
+    made = seen(6, 2.0, 3.0, 1.0)
+    (rival,) = [each for each in rivals_of(made, 0) if each.alike]
+    assert names(rival.together) == {"frame"}
+
+
+def test_a_frame_has_the_three_zeros_that_do_the_same_in_its_declared_set():
+    made = seen(8, 3.0, -1.0, 1.0, effects=[wave(2.0, "other"), FIRST, SECOND, THIRD, FRAME])
+    taken = {"first", "second", "third", "frame"}
+    rivals = [each for number in range(len(made.applied)) for each in rivals_of(made, number) if each.alike]
+    assert set().union(names(made.applied), *(names(each.together) for each in rivals)) == taken
+
+
+def test_what_zeros_together_do_not_take_is_the_frames_own():
+    made = seen(7, 2.0, 3.0, 1.0, effects=[FIRST, FRAME])
+    assert names(made.applied) == {"frame"}
+    assert not any(each.alike for each in rivals_of(made, 0))
