@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Parameter
-from gcode2krl.gap.posterior.selection import _best_errors, _errors, _errors_of_set_up, rivals_of
+from gcode2krl.gap.posterior.selection import _errors_of_set_up, _Sets, rivals_of
+from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import Added, examined, motion, noise, trace, wave
 
 SIGMA = 1e-4
@@ -68,12 +69,14 @@ def test_the_best_set_is_that_of_all_sets(seed):
     made = seen(seed, *np.random.default_rng(seed).uniform(-3.0, 3.0, 3))
     columns = _errors_of_set_up(made)
     assert len(columns) == 4
-    view = made.data.gram(made.fitted, without=range(len(made.applied)))
+    sets = _Sets(made.data.gram(made.fitted, without=range(len(made.applied))), columns, 1.0)
     every = [
-        _errors(view, columns, keys) for count in range(5) for keys in itertools.combinations(columns, count)
+        sets.of(keys, sizes)
+        for count in range(5)
+        for keys in itertools.combinations(columns, count)
+        for sizes in THRESHOLDS.posterior.set_up_sizes
     ]
-    best = max(every, key=lambda each: each.worth(1.0))
-    assert _best_errors(view, columns, 1.0).worth(1.0) == pytest.approx(best.worth(1.0))
+    assert sets.best().worth == pytest.approx(max(each.worth for each in every))
 
 
 def test_two_wrong_zeros_are_found_where_a_frame_comes_first():

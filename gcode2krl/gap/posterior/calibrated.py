@@ -67,7 +67,7 @@ class Features:
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
     causes: int
-    """Number of causes that were accepted in the link and are not far smaller."""
+    """Number of causes that were accepted in the link and are not far smaller; a set-up's errors are one."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -144,6 +144,7 @@ def features_of(
 ) -> Features:
     """Return the features of an accepted effect."""
     gain = found.gains[number]
+    least = _LIMITS.counted_share * gain
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(gain, 0.0) / found.data.values) ** 0.5,
@@ -159,7 +160,7 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
-        causes=sum(found.gains[each] >= _LIMITS.counted_share * gain for each in found.cause_numbers),
+        causes=_count([each for each in found.cause_numbers if found.gains[each] >= least], found),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,
@@ -168,6 +169,12 @@ def features_of(
             constant is None or constant.is_one_number,
         ].count(False),
     )
+
+
+def _count(numbers: Sequence[int], found: Examination) -> int:
+    """Return how many causes these are, a set-up's errors being one: that there are several is usual."""
+    of_set_up = [bool(found.applied[number].effect.of_set_up) for number in numbers]
+    return of_set_up.count(False) + any(of_set_up)
 
 
 def _within(nats: float) -> float:

@@ -23,7 +23,7 @@ would do as well.
 """
 
 import itertools
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -382,8 +382,13 @@ def examine(
     return examination
 
 
-def with_rival(examination: Examination, number: int, rival: Applied) -> Examination | None:
-    """Return the examination with a rival in place of an accepted effect; None where it fails a test."""
+def with_rival(
+    examination: Examination, number: int, rival: Applied, *, is_of_set: bool = False
+) -> Examination | None:
+    """Return the examination with a rival in place of an accepted effect; None where it fails a test.
+
+    ``is_of_set``: what it brings beside others of a set may be small.
+    """
     others = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
     before = examination.dropping(number, others)
     key, candidates = rival.key, examination.data.candidates
@@ -391,7 +396,7 @@ def with_rival(examination: Examination, number: int, rival: Applied) -> Examina
     if column is None:
         return None
     fitted = refit(examination.likelihood, (*others.applied, rival))
-    surprising = _tested(before, _Trial(column, fitted))
+    surprising = _tested(before, _Trial(column, fitted), is_of_set=is_of_set)
     return None if surprising is None else _with(before, fitted, surprising)
 
 
@@ -526,7 +531,7 @@ def _best_alternative(examination: Examination, start: Applied) -> Applied:
     return min(alternatives, key=lambda each: examination.likelihood.chi2((*examination.applied, each)))
 
 
-def _tested(examination: Examination, trial: _Trial) -> float | None:
+def _tested(examination: Examination, trial: _Trial, *, is_of_set: bool = False) -> float | None:
     """Return how surprising a trial's gain is; None where it fails a test.
 
     It must be no bound hit, large enough, surprising beside the scatter over stretches of time, and lower
@@ -536,7 +541,8 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
     gain = examination.fitted.chi2 - fitted.chi2
     last = fitted.numbers.free[-1]
     pushed = last.shapes_at_end(fitted.x[fitted.numbers.slices[-1]])  # the data want a form beyond its range
-    if fitted.at_bound[-1] or pushed or gain < _LIMITS.least_ratio**2 * examination.data.times:
+    least = 0.0 if is_of_set else _LIMITS.least_ratio**2 * examination.data.times
+    if fitted.at_bound[-1] or pushed or gain < least:
         return None
     sensitivity = sensitivity_of(examination.likelihood, fitted, len(fitted.applied) - 1)
     # shapes are searched too, so that chi2 has a degree for each of them
@@ -554,21 +560,65 @@ class _Errors:
     """Some errors of a set-up beside accepted effects, to first order."""
 
     keys: tuple[Key, ...]
+    sizes: float
+    """The standard deviation of their prior, one of `set_up_sizes`."""
+    spread: float
+    """The inflation of a gain."""
     chi2: float
     cost: float
     """What all numbers cost, as chi2."""
     coefficients: Floats
     """Of their columns, in this order."""
 
-    def worth(self, spread: float) -> float:
-        """Return twice their evidence, chi2 over its inflation."""
-        return -self.chi2 / spread - self.cost
+    @property
+    def worth(self) -> float:
+        """Return twice their evidence."""
+        return -self.chi2 / self.spread - self.cost
 
     def applied(self, columns: Mapping[Key, Column], trace: Trace) -> list[Applied]:
-        """Return the errors at their sizes."""
+        """Return the errors at their values."""
         ends = np.cumsum([columns[key].width for key in self.keys])[:-1]
-        sizes = np.split(self.coefficients, ends)
-        return [columns[key].block.applied(x, trace) for key, x in zip(self.keys, sizes, strict=False)]
+        values = np.split(self.coefficients, ends)
+        return [columns[key].block.applied(x, trace) for key, x in zip(self.keys, values, strict=False)]
+
+
+class _Sets:
+    """The sets of a set-up's errors beside some accepted effects."""
+
+    def __init__(self, gram: Gram, columns: Mapping[Key, Column], spread: float | None = None) -> None:
+        """Take the fast view beside the effects; ``spread``: by default that of all errors."""
+        self._gram, self._columns = gram, columns
+        every = np.concatenate([column.index for column in columns.values()])
+        self._spread = gram.inflation(every) if spread is None else spread
+
+    def of(self, keys: Collection[Key], sizes: float) -> _Errors:
+        """Return some errors at their best values, the accepted effects refitted beside them."""
+        chosen = [key for key in self._columns if key in keys]
+        at = np.concatenate([np.zeros(0, dtype=int), *(self._columns[key].index for key in chosen)])
+        return _Errors(tuple(chosen), sizes, self._spread, *self._gram.fitted(at, sizes))
+
+    def sized(self, keys: Collection[Key]) -> _Errors:
+        """Return some errors with the prior of most evidence."""
+        return max((self.of(keys, sizes) for sizes in _LIMITS.set_up_sizes), key=lambda each: each.worth)
+
+    def best(self, needed: frozenset[Key] = frozenset()) -> _Errors:
+        """Return the set with the most evidence, reached from all errors or from those that it needs.
+
+        From few of them a frame comes first, which has the form of two wrong zeros, and then none is missing.
+        """
+        ends = [self._climbed(start, needed) for start in (frozenset(self._columns), needed)]
+        return max(ends, key=lambda each: each.worth)
+
+    def _climbed(self, start: frozenset[Key], needed: frozenset[Key]) -> _Errors:
+        """Return where one error more or less, or other sizes, bring no evidence."""
+        best = self.sized(start)
+        while True:
+            others = [{other} ^ {*best.keys} for other in self._columns if other not in needed]
+            trials = [*(self.of(keys, best.sizes) for keys in others), self.sized(best.keys)]
+            better = max(trials, key=lambda each: each.worth)
+            if better.worth <= best.worth:
+                return best
+            best = better
 
 
 def _errors_of_set_up(examination: Examination) -> dict[Key, Column]:
@@ -582,39 +632,6 @@ def _accepted_errors(examination: Examination) -> frozenset[int]:
     return frozenset(number for number, each in applied if each.effect.of_set_up)
 
 
-def _errors(gram: Gram, columns: Mapping[Key, Column], keys: Sequence[Key]) -> _Errors:
-    """Return some errors at their best sizes, the accepted effects refitted beside them."""
-    chosen = np.concatenate([np.zeros(0, dtype=int), *(columns[key].index for key in keys)])
-    return _Errors(tuple(keys), *gram.fitted(chosen))
-
-
-def _best_errors(
-    gram: Gram, columns: Mapping[Key, Column], spread: float, needed: frozenset[Key] = frozenset()
-) -> _Errors:
-    """Return the set of errors with the most evidence, from all or few by one put in or left out at a time.
-
-    From few of them a frame comes first, which has the form of two wrong zeros, and then none is missing.
-    """
-    ends = [_climbed(gram, columns, spread, needed, start) for start in (columns.keys(), needed)]
-    return max(ends, key=lambda each: each.worth(spread))
-
-
-def _climbed(
-    gram: Gram, columns: Mapping[Key, Column], spread: float, needed: Set[Key], start: Set[Key]
-) -> _Errors:
-    best = _errors(gram, columns, [key for key in columns if key in start])
-    while True:
-        trials = [
-            _errors(gram, columns, [key for key in columns if (key in best.keys) != (key == other)])
-            for other in columns
-            if other not in needed
-        ]
-        better = max(trials, key=lambda each: each.worth(spread), default=best)
-        if better.worth(spread) <= best.worth(spread):
-            return best
-        best = better
-
-
 def _with_best_errors(examination: Examination) -> Examination:
     """Return the examination with another set of the set-up's errors, where that is clearly the better one.
 
@@ -625,19 +642,20 @@ def _with_best_errors(examination: Examination) -> Examination:
     if not columns or not examination.applied:
         return examination
     accepted, data = _accepted_errors(examination), examination.data
-    view = data.gram(examination.fitted, without=accepted)
-    spread = view.inflation(np.concatenate([column.index for column in columns.values()]))
-    now = _errors(view, columns, [examination.applied[number].key for number in sorted(accepted)])
-    others = [number for number in range(len(examination.applied)) if number not in accepted]
-    sets = [(accepted, _best_errors(view, columns, spread))]
-    for number in others:
-        view = data.gram(examination.fitted, without={*accepted, number})
-        sets.append((accepted | {number}, _best_errors(view, columns, spread)))
-    taken_out, best = max(sets, key=lambda each: each[1].worth(spread))
-    if best.worth(spread) < now.worth(spread) + 2.0 * declared_nats():
+    sets = _Sets(data.gram(examination.fitted, without=accepted), columns)
+    now = sets.sized(examination.accepted_keys)
+    taken_out, best = accepted, sets.best()
+    for number in range(len(examination.applied)):
+        if number not in accepted:
+            others = _Sets(data.gram(examination.fitted, {*accepted, number}), columns, now.spread)
+            trial = others.best()
+            if trial.worth > best.worth:
+                taken_out, best, sets = accepted | {number}, trial, others
+    least = now.worth + 2.0 * declared_nats()
+    if best.worth < least:
         return examination
     changed = _with_errors(examination, taken_out, best.applied(columns, examination.traces[0]))
-    return changed if changed.cost < examination.cost - 2.0 * declared_nats() else examination
+    return changed if sets.sized(changed.accepted_keys).worth >= least else examination
 
 
 def _with_errors(
@@ -654,9 +672,11 @@ def _with_errors(
     )
     for error in errors:
         number = next(i for i, each in enumerate(changed.applied) if each.key == error.key)
-        others = refit(changed.likelihood, changed.without(number), steps=_PRUNING_STEPS)
-        alone = with_rival(changed, number, changed.applied[number])
-        changed = changed.dropping(number, others) if alone is None else alone
+        tested = with_rival(changed, number, changed.applied[number], is_of_set=True)
+        if tested is None:
+            others = refit(changed.likelihood, changed.without(number), steps=_PRUNING_STEPS)
+            tested = changed.dropping(number, others)
+        changed = tested
     return changed
 
 
@@ -778,15 +798,15 @@ def _set_up_rival(examination: Examination, number: int, spread: float) -> Rival
     ``spread`` is the inflation of the cause's gain.
     """
     columns = _errors_of_set_up(examination)
-    if not columns:
+    if len(columns) < 2:
         return None
     key, taken_out = examination.applied[number].key, _accepted_errors(examination)
-    view = examination.data.gram(examination.fitted, without=taken_out)
-    beside = _best_errors(view, columns, spread, needed=frozenset({key} & columns.keys()))
+    view = examination.data.gram(examination.fitted, taken_out)
+    beside = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
     if number not in taken_out:
-        view = examination.data.gram(examination.fitted, without={*taken_out, number})
+        view = examination.data.gram(examination.fitted, {*taken_out, number})
     others = {each: column for each, column in columns.items() if each != key}
-    instead = _best_errors(view, others, spread)
+    instead = _Sets(view, others, spread).best()
     applied = [
         each for each in instead.applied(columns, examination.traces[0]) if each.key not in beside.keys
     ]
