@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcode2krl.effects import Parameter
-from gcode2krl.gap.posterior.selection import _errors_of_set_up, _Sets, rivals_of
+from gcode2krl.gap.posterior.selection import _errors_of_set_up, _Sets, rivals_of, with_set_rival
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import Added, examined, motion, noise, trace, wave
 
@@ -86,20 +86,21 @@ def test_two_wrong_zeros_are_found_where_a_frame_comes_first():
         assert each["size_rad"] == pytest.approx(2.0 * SIGMA, rel=0.1)
 
 
-def test_zeros_that_do_together_what_a_frame_does_are_declared_with_it():
+def declared(made, number=0):
+    rivals = with_set_rival(made, number, rivals_of(made, number))
+    return set().union(*(names(each.together) for each in rivals if each.alike))
+
+
+def test_what_does_the_same_together_is_declared():
     made = seen(6, 2.0, 3.0, 1.0)
-    (rival,) = [each for each in rivals_of(made, 0) if each.alike]
-    assert names(rival.together) == {"frame"}
-
-
-def test_a_frame_has_the_three_zeros_that_do_the_same_in_its_declared_set():
-    made = seen(8, 3.0, -1.0, 1.0, effects=[wave(2.0, "other"), FIRST, SECOND, THIRD, FRAME])
-    taken = {"first", "second", "third", "frame"}
-    rivals = [each for number in range(len(made.applied)) for each in rivals_of(made, number) if each.alike]
-    assert set().union(names(made.applied), *(names(each.together) for each in rivals)) == taken
+    assert [declared(made, number) for number in range(2)] == [{"frame"}, {"frame"}]
+    whole = seen(8, 3.0, -1.0, 1.0)  # all three zeros, or the frame
+    sets = [{each.effect.name} | declared(whole, n) for n, each in enumerate(whole.applied)]
+    assert all("frame" in each for each in sets)
+    assert set().union(*sets) == {"first", "second", "third", "frame"}
 
 
 def test_what_zeros_together_do_not_take_is_the_frames_own():
     made = seen(7, 2.0, 3.0, 1.0, effects=[FIRST, FRAME])
     assert names(made.applied) == {"frame"}
-    assert not any(each.alike for each in rivals_of(made, 0))
+    assert declared(made) == set()

@@ -55,7 +55,14 @@ from gcode2krl.gap.posterior.examination import (
 from gcode2krl.gap.posterior.excursions import with_excursions
 from gcode2krl.gap.posterior.families import Evidence
 from gcode2krl.gap.posterior.likelihood import Key, Likelihood, refit
-from gcode2krl.gap.posterior.selection import Rival, examine, rival_probabilities, rivals_of, with_rival
+from gcode2krl.gap.posterior.selection import (
+    Rival,
+    examine,
+    rival_probabilities,
+    rivals_of,
+    with_rival,
+    with_set_rival,
+)
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 NAMED = THRESHOLDS.posterior.named
@@ -346,15 +353,17 @@ def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Riva
     swaps: dict[Key, Applied] = {}
     while True:
         rivals = {number: rivals_of(examination, number) for number in examination.cause_numbers}
-        better = [(each, number) for number, every in rivals.items() for each in every if each.is_better]
+        better = [(each[0], number) for number, each in rivals.items() if each and each[0].is_better]
         if not better or len(swaps) >= len(examination.causes):
-            return examination, rivals, swaps
+            break
         best, number = min(better, key=lambda pair: pair[0].cost_difference)
         swapped = with_rival(examination, number, best.applied)
         if swapped is None or swapped.cost >= examination.cost:
-            return examination, rivals, swaps
+            break
         swaps[examination.applied[number].key] = best.applied
         examination = swapped
+    rivals = {number: with_set_rival(examination, number, each) for number, each in rivals.items()}
+    return examination, rivals, swaps
 
 
 def _with_excursions(judged: Judgement) -> Judgement:

@@ -747,8 +747,8 @@ class Rival:
 
     @property
     def is_better(self) -> bool:
-        """Tell whether the rival, a single one, has more evidence than the cause."""
-        return self.cost_difference < -_SETTLED and not self.beside
+        """Tell whether the rival has more evidence than the cause."""
+        return self.cost_difference < -_SETTLED
 
     @property
     def behind_nats(self) -> float:
@@ -784,22 +784,20 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
         apart = examination.likelihood.residual(fitted.applied) - residual
         distance2 = float(apart @ apart) / max(power, 1e-300)
         rivals[start.key] = Rival(fitted.applied[-1], float(cost), float(difference), distance2)
-    group = _set_up_rival(examination, number, spread)
-    if group is not None and not any(rivals[each.key].alike for each in group.together if each.key in rivals):
-        rivals[group.applied.key] = group
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
 
 
-def _set_up_rival(examination: Examination, number: int, spread: float) -> Rival | None:
-    """Return the errors of the set-up that together do what a cause does; None where data tell it from them.
+def with_set_rival(examination: Examination, number: int, rivals: Sequence[Rival]) -> list[Rival]:
+    """Return the rivals of a cause with the errors of the set-up that do the same together.
 
     Every arm has some of all of them, so that one more is no less probable than the cause. The best set with
     the cause is compared with the best one without it: the cause is known by what no set takes from it.
-    ``spread`` is the inflation of the cause's gain.
+    Nothing is added where the data tell the cause from them, or where one of them does the same alone.
     """
     columns = _errors_of_set_up(examination)
     if len(columns) < 2:
-        return None
+        return [*rivals]
+    spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
     key, taken_out = examination.applied[number].key, _accepted_errors(examination)
     view = examination.data.gram(examination.fitted, taken_out)
     beside = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
@@ -810,11 +808,12 @@ def _set_up_rival(examination: Examination, number: int, spread: float) -> Rival
     applied = [
         each for each in instead.applied(columns, examination.traces[0]) if each.key not in beside.keys
     ]
-    if not applied:
-        return None
+    alike = {rival.applied.key for rival in rivals if rival.alike}
+    if not applied or not alike.isdisjoint(each.key for each in applied):
+        return [*rivals]
     chi2 = (instead.chi2 - beside.chi2) / spread
-    rival = Rival(applied[0], chi2 + instead.cost - beside.cost, chi2, beside=tuple(applied[1:]))
-    return rival if rival.alike else None
+    together = Rival(applied[0], chi2 + instead.cost - beside.cost, chi2, beside=tuple(applied[1:]))
+    return sorted([*rivals, together] if together.alike else rivals, key=lambda each: each.cost_difference)
 
 
 def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[Applied]:
