@@ -680,6 +680,16 @@ class Examination:
         return tuple(number for number, usual in enumerate(self.usual) if not usual)
 
     @property
+    def errors_of_set_up(self) -> frozenset[int]:
+        """Return which of the accepted effects are errors of the set-up."""
+        applied = enumerate(self.applied)
+        return frozenset(number for number, each in applied if each.effect.of_set_up)
+
+    def is_of_set(self, number: int) -> bool:
+        """Tell whether an accepted effect is one of several errors of the set-up."""
+        return number in self.errors_of_set_up and len(self.errors_of_set_up) > 1
+
+    @property
     def accepted_keys(self) -> frozenset[Key]:
         """Return names and targets of the accepted effects."""
         return frozenset(applied.key for applied in self.applied)

@@ -626,12 +626,6 @@ def _errors_of_set_up(examination: Examination) -> dict[Key, Column]:
     return {column.block.key: column for column in columns if column.block.effect.of_set_up}
 
 
-def _accepted_errors(examination: Examination) -> frozenset[int]:
-    """Return which of the accepted effects are errors of the set-up."""
-    applied = enumerate(examination.applied)
-    return frozenset(number for number, each in applied if each.effect.of_set_up)
-
-
 def _with_best_errors(examination: Examination) -> Examination:
     """Return the examination with another set of the set-up's errors, where that is clearly the better one.
 
@@ -641,7 +635,7 @@ def _with_best_errors(examination: Examination) -> Examination:
     columns = _errors_of_set_up(examination)
     if not columns or not examination.applied:
         return examination
-    accepted, data = _accepted_errors(examination), examination.data
+    accepted, data = examination.errors_of_set_up, examination.data
     sets = _Sets(data.gram(examination.fitted, without=accepted), columns)
     now = sets.sized(examination.accepted_keys)
     taken_out, best = accepted, sets.best()
@@ -751,6 +745,12 @@ class Rival:
         return self.cost_difference < -_SETTLED
 
     @property
+    def is_rarer(self) -> bool:
+        """Tell whether it is no error of a set-up, which are usual, and the data do not clearly tell it."""
+        is_clear = self.cost_difference < -2.0 * declared_nats()
+        return not (self.applied.effect.of_set_up or is_clear)
+
+    @property
     def behind_nats(self) -> float:
         """Return by how much the rival is worse, in nats; the smaller of both differences."""
         return 0.5 * min(self.cost_difference, self.chi2_difference)
@@ -798,7 +798,7 @@ def with_set_rival(examination: Examination, number: int, rivals: Sequence[Rival
     if len(columns) < 2:
         return [*rivals]
     spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
-    key, taken_out = examination.applied[number].key, _accepted_errors(examination)
+    key, taken_out = examination.applied[number].key, examination.errors_of_set_up
     view = examination.data.gram(examination.fitted, taken_out)
     beside = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
     if number not in taken_out:
