@@ -646,7 +646,8 @@ def _with_best_errors(examination: Examination) -> Examination:
             if trial.worth > best.worth:
                 taken_out, best, sets = accepted | {number}, trial, others
     least = now.worth + 2.0 * declared_nats()
-    if best.worth < least:
+    replaced = {each.key for number, each in enumerate(examination.applied) if number in taken_out}
+    if best.worth < least or replaced <= {*best.keys}:  # what only comes beside was tried by itself
         return examination
     changed = _with_errors(examination, taken_out, best.applied(columns, examination.traces[0]))
     return changed if sets.sized(changed.accepted_keys).worth >= least else examination
