@@ -629,8 +629,7 @@ def _errors_of_set_up(examination: Examination) -> dict[Key, Column]:
 def _with_best_errors(examination: Examination) -> Examination:
     """Return the examination with another set of the set-up's errors, where that is clearly the better one.
 
-    Beside the other accepted effects, or all but one of them: errors together may have the form of what was
-    accepted before them.
+    In place of all causes: errors together may have the form of one that was accepted before them.
     """
     columns = _errors_of_set_up(examination)
     if not columns or not examination.applied:
@@ -648,6 +647,8 @@ def _with_best_errors(examination: Examination) -> Examination:
     least = now.worth + 2.0 * declared_nats()
     replaced = {each.key for number, each in enumerate(examination.applied) if number in taken_out}
     if best.worth < least or replaced <= {*best.keys}:  # what only comes beside was tried by itself
+        return examination
+    if not taken_out >= {*examination.cause_numbers}:  # a set also takes the form of what the library lacks
         return examination
     changed = _with_errors(examination, taken_out, best.applied(columns, examination.traces[0]))
     return changed if sets.sized(changed.accepted_keys).worth >= least else examination
