@@ -475,6 +475,10 @@ class PosteriorThresholds:
     shape_span: float = convention(
         0.8, "of its range: a shape whose 90 % interval is wider was not found, and is not stated"
     )
+    set_up_sizes: tuple[float, ...] = convention(
+        (3.0, 1.0, 0.3),
+        "the same of the errors of a set-up, of which the data tell how large they are all together",
+    )
     number_cost: float = convention(
         0.5, "of two effects that are one to the data the one with fewer numbers is named; as chi2"
     )

@@ -9,6 +9,7 @@ from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.answer.causes import cause_of, slip_cause
 from gcode2krl.gap.answer.result import EffectAt, RivalResult, UnknownAt
+from gcode2krl.gap.answer.words import alike
 from gcode2krl.gap.compare.links import GEAR, PATH
 from gcode2krl.gap.compare.slips import Slip
 from gcode2krl.gap.posterior.cause_tests import Interval
@@ -19,8 +20,15 @@ from tests.gap.synthetic import applied
 JUDGEMENT = SimpleNamespace(link=GEAR, factor=10.0)
 
 
-def _rival(text, alike):
-    return SimpleNamespace(applied=applied(text)[0], alike=alike, behind_nats=1.0 if alike else 20.0)
+def _rival(*texts, alike):
+    together = applied(*texts)
+    return SimpleNamespace(
+        applied=together[0],
+        beside=together[1:],
+        together=together,
+        alike=alike,
+        behind_nats=1.0 if alike else 20.0,
+    )
 
 
 def _cause(rivals=(), rms_after=0.5):
@@ -39,11 +47,26 @@ def test_a_cause_has_the_unit_of_the_report_and_the_link_it_is_reported_in():
 
 
 def test_rivals_are_alike_or_have_a_probability():
-    alike = [(_rival(f"mastering:target=A{n},offset_deg=1", True), 0.1) for n in range(1, 7)]
-    found = cause_of(_cause([*alike, (_rival("base_frame:x_mm=1", False), 0.2)]), JUDGEMENT, "gear")
+    twins = [(_rival(f"mastering:target=A{n},offset_deg=1", alike=True), 0.1) for n in range(1, 7)]
+    found = cause_of(_cause([*twins, (_rival("base_frame:x_mm=1", alike=False), 0.2)]), JUDGEMENT, "gear")
     assert found.indistinguishable_from == tuple(EffectAt("mastering", f"A{n}", 1.0) for n in range(1, 6))
     assert len(found.indistinguishable_from) == THRESHOLDS.answer.most_alike
     assert found.rivals == (RivalResult("base_frame", None, 0.2, 20.0),)
+
+
+def test_what_only_several_do_together_is_told_as_such():
+    several = _rival("mastering:target=A2,offset_deg=1", "mastering:target=A3,offset_deg=1", alike=True)
+    found = cause_of(
+        _cause([(_rival("tool_frame:x_mm=1", alike=True), 0.8), (several, 0.8)]), JUDGEMENT, "gear"
+    )
+    assert found.indistinguishable_from == (
+        EffectAt("mastering", "A2", 1.0, together=True),
+        EffectAt("mastering", "A3", 1.0, together=True),
+        EffectAt("tool_frame", None, 1.0),
+    )
+    assert alike(found.indistinguishable_from) == (
+        "mastering of A2 and mastering of A3 together or tool frame"
+    )
 
 
 @pytest.mark.parametrize(("behind", "is_open"), [(None, False), (-3.0, True), (1.0, True), (20.0, False)])
@@ -51,7 +74,7 @@ def test_an_unknown_of_the_same_kind_is_in_the_set_where_no_form_is_told_from_it
     family = SimpleNamespace(place=SimpleNamespace(name="A2"), on=Dependence.REVERSALS)
     tests = SimpleNamespace(family=family, family_behind=behind, form_ratio=1.0)
     told = cause_of(
-        replace(_cause([(_rival("base_frame:x_mm=1", True), 0.1)]), tests=tests), JUDGEMENT, "gear"
+        replace(_cause([(_rival("base_frame:x_mm=1", alike=True), 0.1)]), tests=tests), JUDGEMENT, "gear"
     )
     unknown = [UnknownAt("A2", "reversals")] if is_open else []
     assert list(told.indistinguishable_from) == [EffectAt("base_frame", None, 1.0), *unknown]

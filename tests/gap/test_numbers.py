@@ -144,8 +144,8 @@ def test_numbers_of_several_effects_stand_one_effect_after_the_other():
     x = numbers.start((SWING, LAG))
     assert len(numbers) == len(x) == 3
     assert [list(range(3))[at] for at in numbers.slices] == [[0, 1], [2]]
-    assert numbers.without(0).tolist() == [2]
-    assert numbers.without(None).tolist() == [0, 1, 2]
+    assert numbers.without((0,)).tolist() == [2]
+    assert numbers.without(()).tolist() == [0, 1, 2]
     swing, lag = numbers.applied(x)
     assert lag == LAG
     assert swing.values == pytest.approx(SWING.values)

@@ -82,10 +82,11 @@ def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] =
         rms_after=None if cause.rms_after is None else judgement.factor * cause.rms_after,
         constant=cause.constant,
         indistinguishable_from=(
-            *(
-                EffectAt(rival.applied.effect.name, rival.applied.target, rival.behind_nats)
-                for rival in alike[: THRESHOLDS.answer.most_alike]
-            ),
+            *[
+                EffectAt(*each.key, rival.behind_nats, together=bool(rival.beside) or None)
+                for rival in sorted(alike, key=lambda each: not each.beside)
+                for each in rival.together
+            ][: THRESHOLDS.answer.most_alike],
             *_unknown(cause),
         ),
         rivals=None

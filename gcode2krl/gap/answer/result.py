@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SCHEMA = "gcode2krl/gap/1"
 _NAMES = {"source": "from"}
 """Names of the contract that Python keeps for itself."""
-_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats", "moment"})
+_LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats", "moment", "together"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 
@@ -283,6 +283,8 @@ class EffectAt:
     target: str | None
     behind_nats: float | None = None
     """By how much it is worse than the cause that it stands beside; None where that was not compared."""
+    together: bool | None = None
+    """It does so with the others of which this is true; None where it does so alone."""
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,11 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 
 def alike(others: Sequence[EffectAt | UnknownAt]) -> str:
     """Return what a cause cannot be told from."""
-    return listed([_other(each) for each in others], "or")
+    together = [each for each in others if isinstance(each, EffectAt) and each.together]
+    words = [_other(each) for each in others if each not in together]
+    if together:
+        words.insert(0, f"{listed([_other(each) for each in together])} together")
+    return listed(words, "or")
 
 
 def _other(other: EffectAt | UnknownAt) -> str:

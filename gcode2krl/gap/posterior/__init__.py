@@ -70,6 +70,17 @@ so one Gram matrix of [r, T, S, N] holds every candidate's
 - observable share: <S, S> / SᵀS, the power of a signature that nuisance leaves;
 - inflation: see below.
 
+**Errors of a set-up** (`selection`): wrong zeros, base and tool, of which every arm has several, so that all
+their sets S are as probable beforehand. With w ~ N(0, a²·I) in typical sizes, a the same for all, and H the
+information on accepted effects and S, the fast view gives the evidence of each set and width,
+
+    -2·log p(r | S, a) = chi2/inflation + |w|²/a² + log det(I + A·H·A) + number_cost·numbers
+
+with A the widths on its diagonal (MacKay 1992 learns a the same way). The best S is reached by one error more
+or less, from all of them and from none. It takes the place of what was accepted one by one where it has
+`declared_nats` more. A cause is told from the others by the best set with it over the best without it; where
+that is less, the declared set of the cause holds what only the second has.
+
 **Clusters** (`gram`). No model is exact, so what is left of r is neither white nor independent. Rows of one
 stretch of time (one second, all components) are a cluster g with the score u_g = Σ_{i in g} J_i·r_i. The
 sandwich H⁻¹·(Σ_g u_g·u_gᵀ)·H⁻¹ (White 1980) is the covariance of θ without the assumption of independent

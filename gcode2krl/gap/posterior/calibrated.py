@@ -59,7 +59,7 @@ class Features:
     fold_agreement: float | None
     """Share of the splits in which the other data alone choose the same effect at the same target."""
     shrink_of_rest: float | None
-    """Of what the causes above it leave on held-out data, the share that it takes."""
+    """Of what the causes above it, or the others of its set, leave on held-out data, the share it takes."""
     shrink_where_others: float | None
     """Of the gap on held-out data, the share that it takes where causes above it act too; 1 if none does."""
     shrink_together: float | None
@@ -67,7 +67,7 @@ class Features:
     share_left: float
     """Of the gap, what all causes leave on held-out data and on those that explain; 0 if insignificant."""
     causes: int
-    """Number of causes that were accepted in the link and are not far smaller."""
+    """Number of causes that were accepted in the link and are not far smaller; those of a set-up are one."""
     gap_p: float
     """Of the best family's evidence by chance, the cause taken out."""
     conditions_failed: int
@@ -158,6 +158,8 @@ def features_of(
 ) -> Features:
     """Return the features of an accepted effect."""
     gain = found.gains[number]
+    least, errors = _LIMITS.counted_share * gain, found.errors_of_set_up
+    large = {each for each in found.cause_numbers if found.gains[each] >= least}
     return Features(
         surprise=_within(found.surprises[number] - found.level),
         size_over_noise=(max(gain, 0.0) / found.data.values) ** 0.5,
@@ -173,7 +175,7 @@ def features_of(
         shrink_where_others=held_out.shrink_where_others,
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
-        causes=sum(found.gains[each] >= _LIMITS.counted_share * gain for each in found.cause_numbers),
+        causes=len(large - errors) + bool(large & errors),
         gap_p=gap_p,
         conditions_failed=[
             tests.is_best,

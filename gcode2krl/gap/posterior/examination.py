@@ -24,7 +24,7 @@ What a load encoder shows but the joint does not do, its zero and its clock, sta
 """
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -595,9 +595,9 @@ class LinkData:
         """The times at which the runs are at each place."""
         return PlaceTimes(self.traces)
 
-    def gram(self, fitted: Fitted, without: int | None = None) -> Gram:
-        """Return the fast view beside the accepted effects, or all but one of them."""
-        others = tuple(each for number, each in enumerate(fitted.applied) if number != without)
+    def gram(self, fitted: Fitted, without: Collection[int] = ()) -> Gram:
+        """Return the fast view beside the accepted effects, or all but some of them."""
+        others = tuple(each for number, each in enumerate(fitted.applied) if number not in without)
         tangents = self.likelihood.tangents(fitted.numbers, fitted.x, without)
         return self.signatures.beside(self.likelihood.data(others, tangents))
 
@@ -678,6 +678,16 @@ class Examination:
     def cause_numbers(self) -> tuple[int, ...]:
         """Return which of the accepted effects are more than normal mismatch."""
         return tuple(number for number, usual in enumerate(self.usual) if not usual)
+
+    @property
+    def errors_of_set_up(self) -> frozenset[int]:
+        """Return which of the accepted effects are errors of the set-up."""
+        applied = enumerate(self.applied)
+        return frozenset(number for number, each in applied if each.effect.of_set_up)
+
+    def is_of_set(self, number: int) -> bool:
+        """Tell whether an accepted effect is one of several errors of the set-up."""
+        return number in self.errors_of_set_up and len(self.errors_of_set_up) > 1
 
     @property
     def accepted_keys(self) -> frozenset[Key]:

@@ -361,6 +361,20 @@ class Gram:
         coefficients, _, chi2 = self._fit(free, precision)
         return self.chi2 - chi2, coefficients[self.tangents :]
 
+    def fitted(self, columns: Ints, sizes: float) -> tuple[float, float, Floats]:
+        """Return chi2 with signatures, what all numbers cost as in `Fitted.occam`, and the coefficients.
+
+        ``sizes`` is the standard deviation of the coefficients' prior.
+        """
+        free = np.r_[np.arange(1, 1 + self.tangents), self._at(columns)]
+        precision = np.r_[np.zeros(self.tangents), np.full(len(columns), sizes**-2)]
+        coefficients, b, chi2 = self._fit(free, precision)
+        at = np.r_[free, self._kept + np.flatnonzero(np.abs(b) < MOST)]
+        prior = np.r_[np.full(self.tangents, _PRIOR), np.full(len(columns), sizes)]
+        narrowed = marginal(self.total[np.ix_(at, at)], len(free)) * np.outer(prior, prior)
+        cost = float(np.linalg.slogdet(np.eye(len(free)) + narrowed)[1])
+        return chi2, cost + THRESHOLDS.posterior.number_cost * len(free), coefficients[self.tangents :]
+
     @cached_property
     def marginal(self) -> Floats:
         """(1 + t + s) squared: inner products under the inverse of I + N·Nᵀ, by Woodbury.

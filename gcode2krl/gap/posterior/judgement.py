@@ -55,7 +55,14 @@ from gcode2krl.gap.posterior.examination import (
 from gcode2krl.gap.posterior.excursions import with_excursions
 from gcode2krl.gap.posterior.families import Evidence
 from gcode2krl.gap.posterior.likelihood import Key, Likelihood, refit
-from gcode2krl.gap.posterior.selection import Rival, examine, rival_probabilities, rivals_of, with_rival
+from gcode2krl.gap.posterior.selection import (
+    Rival,
+    examine,
+    rival_probabilities,
+    rivals_of,
+    with_rival,
+    with_set_rival,
+)
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 NAMED = THRESHOLDS.posterior.named
@@ -346,15 +353,22 @@ def _settled(examination: Examination) -> tuple[Examination, dict[int, list[Riva
     swaps: dict[Key, Applied] = {}
     while True:
         rivals = {number: rivals_of(examination, number) for number in examination.cause_numbers}
-        better = [(each[0], number) for number, each in rivals.items() if each and each[0].is_better]
+        better = [
+            (each, number)
+            for number, every in rivals.items()
+            for each in every
+            if each.is_better and not (examination.is_of_set(number) and each.is_rarer)
+        ]
         if not better or len(swaps) >= len(examination.causes):
-            return examination, rivals, swaps
+            break
         best, number = min(better, key=lambda pair: pair[0].cost_difference)
         swapped = with_rival(examination, number, best.applied)
         if swapped is None or swapped.cost >= examination.cost:
-            return examination, rivals, swaps
+            break
         swaps[examination.applied[number].key] = best.applied
         examination = swapped
+    rivals = {number: with_set_rival(examination, number, each) for number, each in rivals.items()}
+    return examination, rivals, swaps
 
 
 def _with_excursions(judged: Judgement) -> Judgement:
@@ -659,6 +673,12 @@ def _held_out(
     if not trials:
         return HeldOut(None, None, None, None, share_left)
     before, after = sizes[order].shrink, sizes[order + 1].shrink
+    if examination.is_of_set(
+        number
+    ):  # what several do together none of them does beside the first ones alone
+        others = [each for each in examination.cause_numbers if each != number]
+        left = [trial.size_with([examination.applied[each] for each in others]) for trial in trials]
+        before, after = pooled(left).shrink, sizes[-1].shrink
     gone = max(0.0, after - before)
     applied = examination.applied[number]
     folds = [trial for trial in trials if trial.is_fold]

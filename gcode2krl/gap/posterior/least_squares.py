@@ -8,7 +8,7 @@ useful slope are searched directly.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -391,10 +391,11 @@ class Numbers:
         ends = np.cumsum([0, *(len(each.names) for each in self.free)]).tolist()
         return tuple(slice(*each) for each in pairwise(ends))
 
-    def without(self, effect: int | None) -> Ints:
-        """Return the places of the numbers of all effects but one."""
+    def without(self, effects: Collection[int]) -> Ints:
+        """Return the places of the numbers of all effects but some."""
         places = np.arange(len(self))
-        return places if effect is None else np.delete(places, self.slices[effect])
+        kept = [places[at] for effect, at in enumerate(self.slices) if effect not in effects]
+        return np.concatenate([places[:0], *kept])
 
     def start(self, applied: Sequence[Applied]) -> Floats:
         """Return the numbers (p,) of effects."""

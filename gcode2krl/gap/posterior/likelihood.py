@@ -365,8 +365,8 @@ class Likelihood:
         b = self._nuisance(projections, applied)
         return float(y @ y - 2.0 * b @ projections + b @ self._normal @ b)
 
-    def tangents(self, numbers: Numbers, x: Floats, without: int | None = None) -> list[Floats]:
-        """Return ∂f/∂θ (k, n, p) of each trace, in typical sizes, of all effects but one."""
+    def tangents(self, numbers: Numbers, x: Floats, without: Collection[int] = ()) -> list[Floats]:
+        """Return ∂f/∂θ (k, n, p) of each trace, in typical sizes, of all effects but some."""
         moving = numbers.without(without)
         shapes = [trace.shape for trace in self.traces]
 
@@ -561,7 +561,7 @@ def sensitivity_of(likelihood: Likelihood, fitted: Fitted, effect: int) -> Sensi
     residual = likelihood.residual(fitted.applied)
     jacobian = likelihood.jacobian(fitted.numbers, fitted.x)
     of_effect = jacobian[:, fitted.numbers.slices[effect]]
-    others = jacobian[:, fitted.numbers.without(effect)]
+    others = jacobian[:, fitted.numbers.without((effect,))]
     if others.shape[1]:
         of_effect = of_effect - others @ np.linalg.lstsq(others, of_effect, rcond=_RANK)[0]
     rows = len(likelihood.clusters)

@@ -254,16 +254,15 @@ class Bench:
         """Return what effects change in the signal (n, k)."""
         return self.trace.sample(applied) - self.trace.nominal if applied else np.zeros(self.trace.shape)
 
-    def foretold(self, applied: Applied | None, information: Floats | None = None) -> Foretold:
-        """Return what an effect shows in the program; None is one that does nothing there.
+    def foretold(self, applied: Sequence[Applied], information: Floats | None = None) -> Foretold:
+        """Return what effects show together in the program.
 
         ``information`` (p, p): that of the measured runs on its numbers, in typical sizes; without it they
         are free.
         """
-        mean = self.shown(() if applied is None else (applied,))
-        numbers = None if applied is None else Numbers.of((applied,), self.trace)
-        x = np.zeros(0) if numbers is None or applied is None else numbers.start((applied,))
-        if numbers is None or not len(x):
+        mean, numbers = self.shown(applied), Numbers.of(applied, self.trace)
+        x = numbers.start(applied)
+        if not len(x):
             return Foretold(mean, np.zeros((mean.shape[1], mean.shape[0], 0)), np.zeros((0, 0)))
         columns = self.likelihood.tangents(numbers, x)[0]
         return Foretold(mean, columns, np.zeros((len(x), len(x))) if information is None else information)
@@ -273,9 +272,9 @@ class Bench:
         return foretold_of(evidence, traces, self.trace, [each.sigma for each in self.found.noise])
 
     def apart(
-        self, first: Applied | None, second: Applied | None, information: Floats | None = None
+        self, first: Sequence[Applied], second: Sequence[Applied], information: Floats | None = None
     ) -> Apart:
-        """Return what sets two effects apart, the second one refitted as far as ``information`` lets it."""
+        """Return what sets two answers apart, the second one refitted as far as ``information`` lets it."""
         return self.between(self.foretold(first), self.foretold(second, information))
 
     def between(self, first: Foretold, second: Foretold) -> Apart:
@@ -328,15 +327,17 @@ class Bench:
         )
 
 
-def allowed_by(information: Floats | None, applied: Applied, trace: Trace) -> tuple[Applied, ...]:
+def allowed_by(
+    information: Floats | None, applied: Sequence[Applied], trace: Trace
+) -> tuple[tuple[Applied, ...], ...]:
     """Return an answer with other numbers that the measured runs allow, where they allow most.
 
     ``information`` (p, p) as `information_of` returns it. Its numbers are known to their typical size before
     any run; along the directions that the runs have shown least they are moved to both ends of a 90 %
     interval, and stay in their range.
     """
-    numbers = Numbers.of((applied,), trace)
-    x = numbers.start((applied,))
+    numbers = Numbers.of(applied, trace)
+    x = numbers.start(applied)
     if information is None or not len(x):
         return ()
     limits = numbers.box.low, numbers.box.high
@@ -345,14 +346,14 @@ def allowed_by(information: Floats | None, applied: Applied, trace: Trace) -> tu
     for which in range(min(_LIMITS.widest_ways, len(x))):  # the least known first
         step = NORMAL_90 / np.sqrt(precision[which]) * directions[:, which] * numbers.box.scale
         ends += [np.clip(x + step, *limits), np.clip(x - step, *limits)]
-    return tuple(numbers.applied(end)[0] for end in ends)
+    return tuple(numbers.applied(end) for end in ends)
 
 
 _FREE = 1e-9
 """Keeps a normal matrix regular where a number does nothing."""
 
 
-def information_of(examination: Examination, number: int | None, second: Applied) -> Floats | None:
+def information_of(examination: Examination, number: int | None, second: Sequence[Applied]) -> Floats | None:
     """Return what the measured runs say of an answer's numbers (p, p), in typical sizes.
 
     ``number``: the accepted effect in whose place it stands. Over the temperature of probabilities, as
@@ -360,8 +361,8 @@ def information_of(examination: Examination, number: int | None, second: Applied
     """
     others = examination.applied if number is None else examination.without(number)
     likelihood = examination.likelihood
-    numbers = Numbers.of((second,), examination.traces[0])
-    x = numbers.start((second,))
+    numbers = Numbers.of(second, examination.traces[0])
+    x = numbers.start(second)
     if not len(x):
         return None
 
@@ -408,8 +409,8 @@ class Answer:
 
     label: str
     probability: float
-    applied: Applied | None = None
-    """What it does, at its best values."""
+    applied: tuple[Applied, ...] = ()
+    """What does it, at its best values."""
     evidence: Evidence | None = None
     """Of a family. With neither it is something that nobody can simulate."""
 
@@ -576,11 +577,12 @@ def _pairs_of(cause: Cause, judgement: Judgement, families: Sequence[Answer]) ->
     """Yield the pairs of a cause: with each rival, with what the rest depends on, with the unknown."""
     examination = judgement.examination
     number = next((n for n in examination.cause_numbers if examination.applied[n] == cause.applied), None)
-    answer = Answer(cause.applied.label, cause.probability, cause.applied)
+    answer = Answer(cause.applied.label, cause.probability, (cause.applied,))
     compared = cause.rivals or ()
     for rival, probability in compared:
         if rival.alike or (probability >= _LIMITS.least_open and cause.probability < _LIMITS.settled):
-            other = Answer(rival.applied.label, probability, rival.applied)
+            label = " and ".join(each.label for each in rival.together)
+            other = Answer(label, probability, rival.together)
             weight = cause.probability * (1.0 if rival.alike else probability)
             yield OpenPair(answer, other, weight, examination, number)
     for family in families:
@@ -639,12 +641,12 @@ class _Known:
 
     answer: Answer
     information: Floats | None = None
-    others: tuple[Applied, ...] = ()
-    """Other numbers of an effect that the runs allow."""
+    others: tuple[tuple[Applied, ...], ...] = ()
+    """Other numbers of its effects that the runs allow."""
 
 
 def _known(pair: OpenPair, answer: Answer) -> _Known:
-    if answer.applied is None:
+    if not answer.applied:
         return _Known(answer)
     information = information_of(pair.found, pair.number, answer.applied)
     return _Known(answer, information, allowed_by(information, answer.applied, pair.found.traces[0]))

@@ -7,6 +7,11 @@ signature is that of a small effect. Of one that is not proportional to its size
 effect grows: of a force that is 45 ms late to a quarter, and then it compares nothing. So twins are looked
 for where signatures hold, with the effect at a tenth of its size, and refitted whatever their gain.
 
+**Errors of the set-up.** Every arm has some wrong zeros, and a base and a tool that are a little off, so that
+none of them is a rarer cause than another, and several together do what one of another kind does: a frame has
+the form of two wrong zeros. They are chosen as a set, the one of all sets with the most evidence; a cause is
+told from them where no set without it has nearly as much.
+
 **Effects that plan anew.** Their signals are late by seconds, and least squares on them have a minimum at
 each stop. Where little more than noise is left they have one minimum, and a few steps tell what the effect
 can bring.
@@ -18,7 +23,7 @@ would do as well.
 """
 
 import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -365,7 +370,9 @@ def examine(
     still = traces[0].still
     assumed = noise or (noise_of_poses if still else noise_of)(traces, candidates.signatures, nuisance)
     examination = _pruned(
-        _selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed))
+        _with_best_errors(
+            _selected(LinkData.of(link, traces, question, known, candidates, nuisance, assumed))
+        )
     )
     if noise is None and examination.causes and not still:
         # what rings or hums looks like noise until its cause is known
@@ -375,8 +382,13 @@ def examine(
     return examination
 
 
-def with_rival(examination: Examination, number: int, rival: Applied) -> Examination | None:
-    """Return the examination with a rival in place of an accepted effect; None where it fails a test."""
+def with_rival(
+    examination: Examination, number: int, rival: Applied, *, is_of_set: bool = False
+) -> Examination | None:
+    """Return the examination with a rival in place of an accepted effect; None where it fails a test.
+
+    ``is_of_set``: what it brings beside others of a set may be small.
+    """
     others = refit(examination.likelihood, examination.without(number), steps=_PRUNING_STEPS)
     before = examination.dropping(number, others)
     key, candidates = rival.key, examination.data.candidates
@@ -384,7 +396,7 @@ def with_rival(examination: Examination, number: int, rival: Applied) -> Examina
     if column is None:
         return None
     fitted = refit(examination.likelihood, (*others.applied, rival))
-    surprising = _tested(before, _Trial(column, fitted))
+    surprising = _tested(before, _Trial(column, fitted), is_of_set=is_of_set)
     return None if surprising is None else _with(before, fitted, surprising)
 
 
@@ -519,7 +531,7 @@ def _best_alternative(examination: Examination, start: Applied) -> Applied:
     return min(alternatives, key=lambda each: examination.likelihood.chi2((*examination.applied, each)))
 
 
-def _tested(examination: Examination, trial: _Trial) -> float | None:
+def _tested(examination: Examination, trial: _Trial, *, is_of_set: bool = False) -> float | None:
     """Return how surprising a trial's gain is; None where it fails a test.
 
     It must be no bound hit, large enough, surprising beside the scatter over stretches of time, and lower
@@ -529,7 +541,8 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
     gain = examination.fitted.chi2 - fitted.chi2
     last = fitted.numbers.free[-1]
     pushed = last.shapes_at_end(fitted.x[fitted.numbers.slices[-1]])  # the data want a form beyond its range
-    if fitted.at_bound[-1] or pushed or gain < _LIMITS.least_ratio**2 * examination.data.times:
+    least = 0.0 if is_of_set else _LIMITS.least_ratio**2 * examination.data.times
+    if fitted.at_bound[-1] or pushed or gain < least:
         return None
     sensitivity = sensitivity_of(examination.likelihood, fitted, len(fitted.applied) - 1)
     # shapes are searched too, so that chi2 has a degree for each of them
@@ -540,6 +553,127 @@ def _tested(examination: Examination, trial: _Trial) -> float | None:
         return surprising
     before = examination.likelihood.residual(examination.applied)
     return surprising if sensitivity.left_out_gain(before, _LIMITS.left_out_groups) > 0.0 else None
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Some errors of a set-up beside accepted effects, to first order."""
+
+    keys: tuple[Key, ...]
+    sizes: float
+    """The standard deviation of their prior, one of `set_up_sizes`."""
+    spread: float
+    """The inflation of a gain."""
+    chi2: float
+    cost: float
+    """What all numbers cost, as chi2."""
+    coefficients: Floats
+    """Of their columns, in this order."""
+
+    @property
+    def worth(self) -> float:
+        """Return twice their evidence."""
+        return -self.chi2 / self.spread - self.cost
+
+    def applied(self, columns: Mapping[Key, Column], trace: Trace) -> list[Applied]:
+        """Return the errors at their values."""
+        ends = np.cumsum([columns[key].width for key in self.keys])[:-1]
+        values = np.split(self.coefficients, ends)
+        return [columns[key].block.applied(x, trace) for key, x in zip(self.keys, values, strict=False)]
+
+
+class _Sets:
+    """The sets of a set-up's errors beside some accepted effects."""
+
+    def __init__(self, gram: Gram, columns: Mapping[Key, Column], spread: float | None = None) -> None:
+        """Take the fast view beside the effects; ``spread``: by default that of all errors."""
+        self._gram, self._columns = gram, columns
+        every = np.concatenate([column.index for column in columns.values()])
+        self._spread = gram.inflation(every) if spread is None else spread
+
+    def of(self, keys: Collection[Key], sizes: float) -> _Errors:
+        """Return some errors at their best values, the accepted effects refitted beside them."""
+        chosen = [key for key in self._columns if key in keys]
+        at = np.concatenate([np.zeros(0, dtype=int), *(self._columns[key].index for key in chosen)])
+        return _Errors(tuple(chosen), sizes, self._spread, *self._gram.fitted(at, sizes))
+
+    def sized(self, keys: Collection[Key]) -> _Errors:
+        """Return some errors with the prior of most evidence."""
+        return max((self.of(keys, sizes) for sizes in _LIMITS.set_up_sizes), key=lambda each: each.worth)
+
+    def best(self, needed: frozenset[Key] = frozenset()) -> _Errors:
+        """Return the set with the most evidence, reached from all errors or from those that it needs.
+
+        From few of them a frame comes first, which has the form of two wrong zeros, and then none is missing.
+        """
+        ends = [self._climbed(start, needed) for start in (frozenset(self._columns), needed)]
+        return max(ends, key=lambda each: each.worth)
+
+    def _climbed(self, start: frozenset[Key], needed: frozenset[Key]) -> _Errors:
+        """Return where one error more or less, or other sizes, bring no evidence."""
+        best = self.sized(start)
+        while True:
+            others = [{other} ^ {*best.keys} for other in self._columns if other not in needed]
+            trials = [*(self.of(keys, best.sizes) for keys in others), self.sized(best.keys)]
+            better = max(trials, key=lambda each: each.worth)
+            if better.worth <= best.worth:
+                return best
+            best = better
+
+
+def _errors_of_set_up(examination: Examination) -> dict[Key, Column]:
+    columns = examination.data.candidates.columns
+    return {column.block.key: column for column in columns if column.block.effect.of_set_up}
+
+
+def _with_best_errors(examination: Examination) -> Examination:
+    """Return the examination with another set of the set-up's errors, where that is clearly the better one.
+
+    In place of all causes: errors together may have the form of one that was accepted before them.
+    """
+    columns = _errors_of_set_up(examination)
+    if not columns or not examination.applied:
+        return examination
+    accepted, data = examination.errors_of_set_up, examination.data
+    sets = _Sets(data.gram(examination.fitted, without=accepted), columns)
+    now = sets.sized(examination.accepted_keys)
+    taken_out, best = accepted, sets.best()
+    for number in range(len(examination.applied)):
+        if number not in accepted:
+            others = _Sets(data.gram(examination.fitted, {*accepted, number}), columns, now.spread)
+            trial = others.best()
+            if trial.worth > best.worth:
+                taken_out, best, sets = accepted | {number}, trial, others
+    least = now.worth + 2.0 * declared_nats()
+    replaced = {each.key for number, each in enumerate(examination.applied) if number in taken_out}
+    if best.worth < least or replaced <= {*best.keys}:  # what only comes beside was tried by itself
+        return examination
+    if not taken_out >= {*examination.cause_numbers}:  # a set also takes the form of what the library lacks
+        return examination
+    changed = _with_errors(examination, taken_out, best.applied(columns, examination.traces[0]))
+    return changed if sets.sized(changed.accepted_keys).worth >= least else examination
+
+
+def _with_errors(
+    examination: Examination, taken_out: Collection[int], errors: Sequence[Applied]
+) -> Examination:
+    """Return the examination with those errors that pass the tests in place of some accepted effects."""
+    kept = [number for number in range(len(examination.applied)) if number not in taken_out]
+    applied = (*(examination.applied[number] for number in kept), *errors)
+    changed = replace(
+        examination,
+        fitted=refit(examination.likelihood, applied),
+        surprises=(*(examination.surprises[number] for number in kept), *(np.inf for _ in errors)),
+        usual=(*(examination.usual[number] for number in kept), *(False for _ in errors)),
+    )
+    for error in errors:
+        number = next(i for i, each in enumerate(changed.applied) if each.key == error.key)
+        tested = with_rival(changed, number, changed.applied[number], is_of_set=True)
+        if tested is None:
+            others = refit(changed.likelihood, changed.without(number), steps=_PRUNING_STEPS)
+            tested = changed.dropping(number, others)
+        changed = tested
+    return changed
 
 
 def _pruned(examination: Examination) -> Examination:
@@ -599,11 +733,24 @@ class Rival:
     chi2_difference: float
     distance2: float = np.inf
     """Square of the distance between both refitted signals, over the power of what the cause does."""
+    beside: tuple[Applied, ...] = ()
+    """Others without which it does not do what the cause does."""
+
+    @property
+    def together(self) -> tuple[Applied, ...]:
+        """Return all effects that stand in place of the cause."""
+        return self.applied, *self.beside
 
     @property
     def is_better(self) -> bool:
         """Tell whether the rival has more evidence than the cause."""
         return self.cost_difference < -_SETTLED
+
+    @property
+    def is_rarer(self) -> bool:
+        """Tell whether it is no error of a set-up, which are usual, and the data do not clearly tell it."""
+        is_clear = self.cost_difference < -2.0 * declared_nats()
+        return not (self.applied.effect.of_set_up or is_clear)
 
     @property
     def behind_nats(self) -> float:
@@ -642,12 +789,41 @@ def rivals_of(examination: Examination, number: int) -> list[Rival]:
     return sorted(rivals.values(), key=lambda rival: rival.cost_difference)
 
 
+def with_set_rival(examination: Examination, number: int, rivals: Sequence[Rival]) -> list[Rival]:
+    """Return the rivals of a cause with the errors of the set-up that do the same together.
+
+    Every arm has some of all of them, so that one more is no less probable than the cause. The best set with
+    the cause is compared with the best one without it: the cause is known by what no set takes from it.
+    Nothing is added where the data tell the cause from them, or where one of them does the same alone.
+    """
+    columns = _errors_of_set_up(examination)
+    if len(columns) < 2:
+        return [*rivals]
+    spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
+    key, taken_out = examination.applied[number].key, examination.errors_of_set_up
+    view = examination.data.gram(examination.fitted, taken_out)
+    beside = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
+    if number not in taken_out:
+        view = examination.data.gram(examination.fitted, {*taken_out, number})
+    others = {each: column for each, column in columns.items() if each != key}
+    instead = _Sets(view, others, spread).best()
+    applied = [
+        each for each in instead.applied(columns, examination.traces[0]) if each.key not in beside.keys
+    ]
+    alike = {rival.applied.key for rival in rivals if rival.alike}
+    if not applied or not alike.isdisjoint(each.key for each in applied):
+        return [*rivals]
+    chi2 = (instead.chi2 - beside.chi2) / spread
+    together = Rival(applied[0], chi2 + instead.cost - beside.cost, chi2, beside=tuple(applied[1:]))
+    return sorted([*rivals, together] if together.alike else rivals, key=lambda each: each.cost_difference)
+
+
 def _of_gain(examination: Examination, number: int, spread: float) -> Iterator[Applied]:
     """Yield other effects whose linear gain comes near that of a cause, the best first.
 
     The gain of both is beside the others refitted: one that does much the same as another gains little.
     """
-    gram = examination.data.gram(examination.fitted, without=number)
+    gram = examination.data.gram(examination.fitted, without=(number,))
     gain = gram.chi2 - examination.fitted.chi2
     candidates = examination.data.candidates
     columns = [column for column in candidates.columns if column.block.key not in examination.accepted_keys]
