@@ -145,7 +145,7 @@ def _say(result: "Geometry", console: Console) -> None:
 
     count, outliers = len(result.row), int(result.is_outlier.sum())
     console.say(
-        f"{result.source}: {result.robot}, {count} points; {len(result.told_parts)} small numbers of the arm"
+        f"{result.source}: {result.robot}, {count} points; {len(result.told_numbers)} small numbers of the arm"
         f": {result.rms_before_mm:.3f} -> {result.rms_after_mm:.3f} mm rms at places left out of the fit"
     )
     console.say(f"  noise   {_noise_words(result)}")

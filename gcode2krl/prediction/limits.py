@@ -10,7 +10,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -82,8 +82,8 @@ class AccelerationLimit:
         n = self._apart
         if not n:
             return
-        block = motion.position_mm, motion.tool, line
-        seam = [np.concatenate([a, b[: 2 * n]]) for a, b in zip(self._before, block, strict=True)]
+        block: tuple[Any, ...] = motion.position_mm, motion.tool, line
+        seam = tuple(np.concatenate([a, b[: 2 * n]]) for a, b in zip(self._before, block, strict=True))
         for position, tool, lines in (seam, block):
             if len(tool) > 2 * n:
                 self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])

@@ -484,7 +484,7 @@ def with_geometry(gap: Gap, without_arm: Gap, arm: ArmGeometry) -> Gap:
         f"{part.name.replace(' ', '_')}_{part.unit}": Interval(
             part.estimate.value, part.estimate.low, part.estimate.high
         )
-        for part in arm.fit.told
+        for part in arm.fit.told_numbers
     }
     cause = CauseResult(
         effect=GEOMETRY,
@@ -532,7 +532,7 @@ def _shrink(arm: ArmGeometry, noise_mm: float) -> float:
 def _notes(arm: ArmGeometry) -> list[str]:
     fit = arm.fit
     notes = [
-        f"geometry: {len(fit.told)} small numbers of the arm, {arm.before_mm:.3f} -> "
+        f"geometry: {len(fit.told_numbers)} small numbers of the arm, {arm.before_mm:.3f} -> "
         f"{arm.after_mm:.3f} mm at places left out of the fit; `gcode2krl identify kinematics` has each "
         "with its interval"
     ]

@@ -124,7 +124,7 @@ class Geometry:
         return None if self.curves is None else _rms(self.curves.after_mm[~self.is_outlier])
 
     @property
-    def told_parts(self) -> tuple[ArmNumber, ...]:
+    def told_numbers(self) -> tuple[ArmNumber, ...]:
         """The arm's own numbers that the poses tell and whose interval leaves out 0."""
         return tuple(
             part
