@@ -22,6 +22,8 @@ from gcode2krl.effects import Applied, Effect, Parameter
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.compare.interpolation import hats
+from gcode2krl.gap.compare.pair import from_base
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -102,39 +104,23 @@ def blocks_of(effect: Effect, target: str | None) -> Iterator[Block]:
 
 
 def blocks_at(
-    effect: Effect, target: str | None, frequencies_hz: Sequence[float], looked_at: float
+    effect: Effect, target: str | None, values: Sequence[float], looked_at: float
 ) -> Iterator[Block]:
-    """Yield the blocks of an effect with a frequency, at these in place of its grid's.
+    """Yield the blocks of an effect that begins at a moment or has a frequency, at these values of it.
 
-    They were chosen out of ``looked_at`` independent ones: one for each 1/T of the range, T the duration of a
-    run (Scargle 1982).
+    They were chosen out of ``looked_at`` independent ones: of frequencies one for each 1/T of the range, T
+    the duration of a run (Scargle 1982).
     """
-    frequency = effect.frequency
-    if frequency is None:
-        return
-    seen = set()
-    for block in blocks_of(effect, target):
-        others = {name: value for name, value in block.shape.items() if name != frequency.name}
-        for value in frequencies_hz:
-            key = (value, *sorted(others.items()))
-            if key not in seen:
-                seen.add(key)
-                tried = max(1.0, looked_at / len(frequencies_hz))
-                yield Block(effect, target, others | {frequency.name: value}, tried)
-
-
-def blocks_from(
-    effect: Effect, target: str | None, moments_s: Sequence[float], looked_at: float
-) -> Iterator[Block]:
-    """Yield the blocks of an effect that begins at a moment, at these out of so many that were looked at."""
-    moment = effect.moment
-    if moment is None:
+    searched, seen = effect.moment or effect.frequency, []
+    if searched is None:
         return
     for block in blocks_of(effect, target):
-        for at_s in moments_s:
-            yield Block(
-                effect, target, {**block.shape, moment.name: at_s}, max(1.0, looked_at / len(moments_s))
-            )
+        others = {name: value for name, value in block.shape.items() if name != searched.name}
+        if others not in seen:
+            seen.append(others)
+            for value in values:
+                tried = max(1.0, looked_at / len(values))
+                yield Block(effect, target, others | {searched.name: value}, tried)
 
 
 def strongest_hz(
@@ -285,12 +271,9 @@ def smooth_in_each(inputs: Sequence[Floats]) -> Functions:
 def smooth_sum(inputs: Sequence[Floats]) -> Functions:
     """Return functions of each of several inputs (n, c), whose sum a deviation may be."""
     parts = [smooth([each[:, i] for each in inputs]) for i in range(inputs[0].shape[1])]
-    used = [part for part in parts if part.width]
-    if not used:
-        return smooth([np.zeros(len(each)) for each in inputs])
+    used = [part for part in parts if part.width] or parts[:1]
     columns = tuple(
-        np.concatenate(parts_of_trace, axis=1)
-        for parts_of_trace in zip(*(part.columns for part in used), strict=True)
+        np.concatenate(each, axis=1) for each in zip(*(part.columns for part in used), strict=True)
     )
     return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
 
@@ -300,12 +283,11 @@ def _smooth(inputs: Sequence[Floats], groups: Sequence[Floats], count: int) -> F
     if not high - low > _VARIES * max(abs(low), abs(high)):
         return Functions(tuple(np.zeros((len(each), 0)) for each in inputs), (np.eye(0),))
     knots = np.linspace(low, high, _LIMITS.knots)
-    hats = [np.maximum(0.0, 1.0 - np.abs(each[:, None] - knots) / (knots[1] - knots[0])) for each in inputs]
     columns: list[Floats] = []
-    for hat, group in zip(hats, groups, strict=True):
-        wide = np.zeros((len(hat), count, len(knots)))
-        wide[np.arange(len(hat)), group] = hat
-        columns.append(wide.reshape(len(hat), -1))
+    for values, group in zip(inputs, groups, strict=True):
+        wide = np.zeros((len(values), count, len(knots)))
+        wide[np.arange(len(values)), group] = hats(values, knots)
+        columns.append(wide.reshape(len(values), -1))
     roots = [in_each(_root(length), count) for length in _LIMITS.lengths]
     return Functions(tuple(columns), tuple(roots))
 
@@ -453,8 +435,9 @@ class Grid:
         """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``."""
         sigma = float(np.mean(self._sigma))
         return tuple(
-            sigma * inputs.as_stated(vector)[:, list(inputs.trace.columns)].T[:, :, None]
-            for inputs, vector in zip(self.inputs, vectors, strict=True)
+            sigma
+            * from_base(vector, trace.frame, trace.inputs, trace.time_s)[:, list(trace.columns)].T[:, :, None]
+            for trace, vector in zip(self.traces, vectors, strict=True)
         )
 
     def _own_joints(self) -> Iterator[Place]:
@@ -514,29 +497,25 @@ class Grid:
         return free(self._pose(turned=False))
 
     @cached_property
-    def _of_force(self) -> list[tuple[Dependence, Functions]]:
-        return list(self._functions_of_force())
-
-    @cached_property
     def _of_time(self) -> list[tuple[Dependence, Functions]]:
-        return list(self._functions_of_time())
-
-    def _functions_of_time(self) -> Iterator[tuple[Dependence, Functions]]:
         inputs, count = self.inputs, len(self.inputs)
-        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in inputs])
-        yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in inputs])
-        if count > 1:
-            runs = [
-                np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(inputs)
-            ]
-            yield Dependence.RUN_TO_RUN, free(runs)
+        since_s, ones = [each.since_start_s for each in inputs], np.eye(count)[:, None]
         grown = [np.stack([-np.expm1(-each.hours / tau) for tau in _WARMS_H], axis=1) for each in inputs]
-        yield Dependence.WALL_CLOCK, free(grown)
-        yield Dependence.RUN_START, smooth([each.since_start_s for each in inputs])
+        functions = [
+            (Dependence.CONSTANT, free([np.ones((len(each), 1)) for each in since_s])),
+            (Dependence.RUN_TIME, smooth_in_each(since_s)),
+            (Dependence.WALL_CLOCK, free(grown)),
+            (Dependence.RUN_START, smooth(since_s)),
+        ]
+        if count > 1:
+            runs = [np.repeat(run, len(each), axis=0) for run, each in zip(ones, since_s, strict=True)]
+            functions.insert(2, (Dependence.RUN_TO_RUN, free(runs)))
         if any(each.spindle.any() for each in inputs):
-            yield Dependence.SPINDLE_SPEED, free([each.spindle for each in inputs])
+            functions.append((Dependence.SPINDLE_SPEED, free([each.spindle for each in inputs])))
         if any(each.temperature_C.any() for each in inputs):
-            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in inputs])
+            temperature_C = [each.temperature_C for each in inputs]
+            functions.append((Dependence.TEMPERATURE, smooth_sum(temperature_C)))
+        return functions
 
     def _of_motion(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
         inputs = self.inputs
@@ -552,8 +531,7 @@ class Grid:
         velocity = [each.velocity_mm_s for each in inputs]
         speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]
         along = [v / np.maximum(s, 1.0) for v, s in zip(velocity, speed, strict=True)]
-        joined = [np.concatenate(each, axis=1) for each in zip(velocity, along, speed, strict=True)]
-        yield Dependence.VELOCITY, free(joined)
+        yield Dependence.VELOCITY, free(_side_by_side(velocity, along, speed))
         yield Dependence.ACCELERATION, free([each.acceleration_mm_s2 for each in inputs])
 
     def _of_joint(self, joint: int) -> Iterator[tuple[Dependence, Functions]]:
@@ -574,26 +552,24 @@ class Grid:
             single = odd([each.torque_Nm[:, joint] for each in inputs])
             # the weight of the links is part of the first; the force alone is what bends the arm
             loads = odd([each.load_torque_Nm[:, joint] for each in inputs])
-            joined = [np.concatenate(each, axis=1) for each in zip(single, loops, loads, strict=True)]
-            yield Dependence.OWN_TORQUE, free(joined)
+            yield Dependence.OWN_TORQUE, free(_side_by_side(single, loops, loads))
 
-    def _functions_of_force(self) -> Iterator[tuple[Dependence, Functions]]:
+    @cached_property
+    def _of_force(self) -> list[tuple[Dependence, Functions]]:
         inputs = self.inputs
         force = [each.force_N for each in inputs]
         size = [np.linalg.norm(each, axis=1, keepdims=True) for each in force]
         most = max(float(each.max()) for each in size)
         unit = [f / np.maximum(s, 1e-3 * most) for f, s in zip(force, size, strict=True)]
         bent = [f * s / most for f, s in zip(force, size, strict=True)]
-        columns = [np.concatenate(each, axis=1) for each in zip(force, bent, unit, size, strict=True)]
-        yield Dependence.FORCE, free(columns)
         place_ = polynomials([each.position_mm for each in inputs], 1)
-        yield Dependence.FORCE_BY_PLACE, free(products(force, place_))
         cut = polynomials([each.cut_m[:, None] for each in inputs], 2)
         grows = products(force, [each[:, 1:] for each in cut])
-        yield (
-            Dependence.METRES_CUT,
-            free([np.concatenate(pair, axis=1) for pair in zip(grows, force, cut, strict=True)]),
-        )
+        return [
+            (Dependence.FORCE, free(_side_by_side(force, bent, unit, size))),
+            (Dependence.FORCE_BY_PLACE, free(products(force, place_))),
+            (Dependence.METRES_CUT, free(_side_by_side(grows, force, cut))),
+        ]
 
     def _pose(self, turned: bool) -> list[Floats]:
         """Return low polynomials of the position, with the axes of the tool where they matter."""
@@ -634,20 +610,19 @@ class Grid:
     @property
     def _passed(self) -> list[Floats]:
         """(n, c) of each trace: 1 from each blended corner on, of one program the same in all runs."""
-        programs: dict[bytes, int] = {}
-        numbers: list[int] = []
-        widths: list[int] = []
-        for inputs in self.inputs:
-            targets = inputs.trace.inputs.targets
-            key = b"" if targets is None else targets.position_mm.tobytes()
-            numbers.append(programs.setdefault(key, len(programs)))
-            if len(programs) > len(widths):
-                widths.append(inputs.corners_passed.shape[1])
-        firsts = np.cumsum([0, *widths])
-        columns = [np.zeros((len(each.corners_passed), firsts[-1])) for each in self.inputs]
-        for number, wide, inputs in zip(numbers, columns, self.inputs, strict=True):
-            wide[:, firsts[number] : firsts[number + 1]] = inputs.corners_passed
-        return columns
+        programs = [
+            b"" if trace.inputs.targets is None else trace.inputs.targets.position_mm.tobytes()
+            for trace in self.traces
+        ]
+        passed = [inputs.corners_passed for inputs in self.inputs]
+        widths = {program: own.shape[1] for program, own in zip(programs, passed, strict=True)}
+        return [
+            np.concatenate(
+                [own if each == program else np.zeros((len(own), width)) for each, width in widths.items()],
+                axis=1,
+            )
+            for program, own in zip(programs, passed, strict=True)
+        ]
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""
@@ -668,6 +643,11 @@ class Grid:
             )
             lifted, _ = place.lifted(free(force))
             yield Family(place, Dependence.FORCE_BY_PLACE, *_joined([lifted, _scaled(bends, sigma)]))
+
+
+def _side_by_side(*parts: Sequence[Floats]) -> list[Floats]:
+    """Return the columns (n, c) of several parts side by side, of each trace."""
+    return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 
 
 def _is_alike(first: Sequence[Floats], second: Sequence[Floats]) -> bool:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gcode2krl.gap import diagnosis
 from gcode2krl.gap.diagnosis import diagnose
-from gcode2krl.gap.posterior import bending
 from tests.gap.synthetic import bent, prediction, runs
 
 pytestmark = pytest.mark.slow
@@ -36,13 +36,13 @@ def added(*, bends):
 def case(request):
     gains = []
     with pytest.MonkeyPatch.context() as patch:
-        followed = bending._followed
+        followed = diagnosis._followed
 
         def kept(*given):
             gains.append(followed(*given))
             return gains[-1]
 
-        patch.setattr(bending, "_followed", kept)
+        patch.setattr(diagnosis, "_followed", kept)
         gap = diagnose(prediction(), runs([], extra=added(bends=request.param)))
     return request.param, gap, gains
 

@@ -63,7 +63,7 @@ def test_force_and_tip_are_compared_with_the_model():
     run = pair(tracker=instrument(Tracker, position_mm=tip), force=instrument(Force, force_N=push))
     np.testing.assert_array_equal(only(MECHANICS, run).measured, tip)
     np.testing.assert_array_equal(only(FORCE, run).measured, push)
-    assert (only(FORCE, run).unit, only(MECHANICS, run).unit) == ("N", "mm")
+    assert (only(FORCE, run).link.unit, only(MECHANICS, run).link.unit) == ("N", "mm")
 
 
 def test_the_tip_is_expected_where_the_measured_joints_put_it():

@@ -7,9 +7,9 @@ import pytest
 
 from gcode2krl.effects import library
 from gcode2krl.gap.answer.causes import moment_of
-from gcode2krl.gap.compare.jumps import jump_clarity, strongest_moments
+from gcode2krl.gap.compare.events import jump_clarity, strongest_moments
 from gcode2krl.gap.compare.trace import Event, Whose
-from gcode2krl.gap.components import Signatures, blocks_from
+from gcode2krl.gap.components import Signatures, blocks_at
 from gcode2krl.gap.posterior.least_squares import free_of
 from gcode2krl.gap.thresholds import THRESHOLDS
 from tests.gap.constructed import stub, trace
@@ -99,7 +99,7 @@ def test_the_moment_of_a_smooth_function_is_that_of_an_event_whose_rows_are_gone
 
 
 def test_blocks_of_a_step_stand_at_the_moments_and_count_what_was_looked_at():
-    blocks = list(blocks_from(STEP.at("tip"), "tip", (4.0, 6.0), 30.0))
+    blocks = list(blocks_at(STEP.at("tip"), "tip", (4.0, 6.0), 30.0))
     assert [block.shape["at_s"] for block in blocks] == [4.0, 6.0]
     assert [block.tried for block in blocks] == [15.0, 15.0]
     tip = trace(np.zeros((500, 3)), "mechanics")
@@ -107,7 +107,7 @@ def test_blocks_of_a_step_stand_at_the_moments_and_count_what_was_looked_at():
     np.testing.assert_allclose(columns[0, :, 0], np.where(tip.time_s > 4.0, 0.1, 0.0), atol=0.051)
     free = free_of(blocks[0].settings(tip)[0], tip)
     assert free.scale[free.names.index("at_s")] == pytest.approx(2.0)
-    assert list(blocks_from(library()["backlash"], "A1", (4.0,), 30.0)) == []
+    assert list(blocks_at(library()["backlash"], "A1", (4.0,), 30.0)) == []
 
 
 def test_a_usual_clock_at_corners_is_no_jump():

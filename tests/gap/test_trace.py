@@ -37,9 +37,9 @@ def test_a_force_is_turned_into_the_axes_of_its_instrument(pushed):
     tool = Rotation.from_quat(quaternion)
     flange = tool * Rotation.from_matrix(INPUTS.cell.tool_matrix(1)[:3, :3]).inv()
     np.testing.assert_allclose(one.nominal, pushed.force_base_N, atol=1e-12)
-    in_tool = replace(one, in_tool_frame=True).nominal
+    in_tool = replace(one, frame="tcp").nominal
     np.testing.assert_allclose(in_tool, tool.inv().apply(pushed.force_base_N), atol=1e-9)
-    in_sensor = replace(one, in_sensor_frame=True).nominal
+    in_sensor = replace(one, frame="sensor").nominal
     np.testing.assert_allclose(in_sensor, flange.inv().apply(pushed.force_base_N), atol=1e-9)
     assert not np.allclose(in_tool, in_sensor)
 
@@ -87,9 +87,9 @@ def test_rates_are_derivatives():
 def test_it_says_what_its_link_is():
     gear = trace(np.zeros((500, 2)), "gear")
     assert isinstance(gear, Trace)
-    assert (gear.signal, gear.unit, gear.shape) == ("joint_load", "deg", (500, 2))
+    assert (gear.signal, gear.link.unit, gear.shape) == ("joint_load", "deg", (500, 2))
     tip = trace(np.zeros((500, 3)), "mechanics")
-    assert (tip.signal, tip.unit) == ("tcp", "mm")
+    assert (tip.signal, tip.link.unit) == ("tcp", "mm")
 
 
 def test_late_commands_show_in_the_drives():

@@ -32,12 +32,11 @@ from gcode2krl.gap.answer.result import (
     UnknownAt,
 )
 from gcode2krl.gap.answer.words import AXES, FORCE_AXES, listed, number
-from gcode2krl.gap.compare.events import line_at
+from gcode2krl.gap.compare.events import jump_within, line_at
 from gcode2krl.gap.compare.inputs import Admissible
-from gcode2krl.gap.compare.interpolation import nearest_rows, step_of
-from gcode2krl.gap.compare.jumps import jump_within
+from gcode2krl.gap.compare.interpolation import rms, step_of
 from gcode2krl.gap.compare.links import MECHANICS, TIMING
-from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.pair import Pair, in_base
 from gcode2krl.gap.compare.slips import Slip
 from gcode2krl.gap.compare.trace import Context, Span, Trace, Whose
 from gcode2krl.gap.noise.source import are_repeats, is_revisited
@@ -312,12 +311,12 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[De
 
     With each what the family says. ``larger_links`` have a larger gap without a name.
     """
-    rest = judgement.rest
-    if rest is None or judgement.verdict in ("no_gap", "explained"):
+    study = judgement.rest
+    if study is None or judgement.verdict in ("no_gap", "explained"):
         return
-    if not (rest.worth_naming or rest.is_gap):
+    if not (study.worth_naming or study.is_gap):
         return
-    for family in family_probabilities(rest, larger_links):
+    for family in family_probabilities(study, larger_links):
         if family.probability >= _LIMITS.least_probability:
             yield _result(judgement, family), family.evidence
 
@@ -328,7 +327,10 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
     is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
     signals = evidence.signal
     if is_vector:
-        signals = tuple(_in_base(trace, own) for trace, own in zip(traces, signals, strict=True))
+        signals = tuple(
+            in_base(signal, trace.frame, trace.inputs, trace.time_s)
+            for trace, signal in zip(traces, signals, strict=True)
+        )
     largest = _largest(signals)
     along = largest if is_step else _main_axis(signals)
     moment = moment_of(traces, evidence.signal, is_smooth=True)
@@ -361,17 +363,6 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         frequency_hz=evidence.at[1] if evidence.on is Dependence.TONE and evidence.at else None,
         course=course,
     )
-
-
-def _in_base(trace: Trace, values: Floats) -> Floats:
-    """Return vectors (n, 3) of a trace along the axes of ``$BASE``."""
-    if not (trace.in_sensor_frame or trace.in_tool_frame):
-        return values
-    inputs = trace.inputs
-    rotation = inputs.sensor_rotation if trace.in_sensor_frame else inputs.tool_rotation
-    rows = nearest_rows(inputs.time_s, trace.time_s)
-    turned: Floats = np.einsum("nij,nj->ni", rotation[rows], values)
-    return turned
 
 
 def _at(evidence: Evidence, signals: tuple[Floats, ...]) -> str:
@@ -547,8 +538,8 @@ def noise_of(judgement: Judgement) -> NoiseResult | None:
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     return NoiseResult(
         stated=judgement.factor * max(stated) if stated else None,
-        learnt=judgement.factor * _rms([each.sigma for each in models]),
-        short=judgement.factor * _rms([each.short_sigma for each in models]),
+        learnt=judgement.factor * rms(np.array([each.sigma for each in models])),
+        short=judgement.factor * rms(np.array([each.short_sigma for each in models])),
         source=_source(traces),
     )
 
@@ -557,10 +548,6 @@ def _source(traces: Sequence[Trace]) -> str:
     if traces[0].still:
         return _REPEATS if is_revisited(traces) else OF_POSES
     return _REPEATS if are_repeats(traces) else _RUNS
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def readings_of_noise(judgements: Sequence[Judgement]) -> Iterator[str]:

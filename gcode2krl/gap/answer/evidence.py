@@ -9,7 +9,7 @@ from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Dependence, Inputs, arm
 from gcode2krl.effects.inputs import gradient
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s
+from gcode2krl.gap.compare.interpolation import nearest_rows, rms, running_mean, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.noise.nuisance import nuisance_for
@@ -208,12 +208,9 @@ def residuals_of(judgement: Judgement) -> list[Residual]:
 
 def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.answer.smooth_s) -> Floats:
     """Return the mean of values (n,) or (n, k) over a time, that of fewer samples at the ends."""
-    if values.ndim == 2:
-        return np.stack([smoothed(time_s, column, over_s) for column in values.T], axis=1)
     step_s = usual_step_s(time_s) if len(time_s) > 1 else over_s
-    kernel = np.ones(min(max(1, round(over_s / step_s)), len(values)))
-    sums: Floats = np.convolve(values, kernel, mode="same")
-    return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
+    rows = min(round(over_s / step_s), len(values))
+    return running_mean(values.reshape(len(values), -1), rows).reshape(values.shape)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -273,9 +270,9 @@ def evidence_of(judgement: Judgement, residuals: Sequence[Residual], depends: De
     return Evidence(
         signal=judgement.link.signal,
         component=component,
-        unit=first.unit,
+        unit=first.link.unit,
         noise=noise * first.factor,
-        size_unit="mm" if in_mm else first.unit,
+        size_unit="mm" if in_mm else first.link.unit,
         runs=runs,
     )
 
@@ -330,7 +327,7 @@ def _component(residuals: Sequence[Residual], at: str | None) -> tuple[str, list
         along = [_along_joint(each.trace, joint) for each in residuals]
         return f"along what {at} moves", along, rms(noise)
     direction = _principal(shapes)
-    axes = " of the sensor" if first.in_sensor_frame else ""
+    axes = " of the sensor" if first.frame == "sensor" else ""
     text = ", ".join(f"{value:.1f}" for value in np.round(direction, 1) + 0.0)
     name = "force" if first.link is FORCE else "tip"
     deviation = float(np.sqrt(np.sum((direction * noise) ** 2)))

@@ -203,10 +203,6 @@ class Admissible:
         """(n, 3, 3) rotations of the tool."""
         return self.trace.inputs.tool_rotation[self._nearest]
 
-    def as_stated(self, vectors: Floats) -> Floats:
-        """Return vectors (n, 3) along ``$BASE`` along the axes in which the signal is stated."""
-        return self.trace.as_stated(vectors, self._nearest)
-
     @cached_property
     def force_N(self) -> Floats:
         """(n, 3) the force that bends the arm: the measured one where the model has it."""

@@ -17,8 +17,15 @@ from gcode2krl.effects import Applied, Inputs, Signals, drives, forces, simulate
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.effects.operators import play
 from gcode2krl.gap.compare.clocks import refined, retimed, with_table_clock
-from gcode2krl.gap.compare.interpolation import cubic, linear, nearest_rows, running_mean, usual_step_s
-from gcode2krl.gap.compare.pair import Pair, usable_rows, with_nominal_joints, with_own_model
+from gcode2krl.gap.compare.interpolation import cubic, hats, linear, nearest_rows, running_mean, usual_step_s
+from gcode2krl.gap.compare.pair import (
+    Pair,
+    axes_of,
+    force_jumps,
+    usable_rows,
+    with_nominal_joints,
+    with_own_model,
+)
 from gcode2krl.gap.compare.trace import Context, FittedVerdict, Link, Trace, Verdict, is_lost, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller, Measured
@@ -67,10 +74,9 @@ def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
 
 def force_zero_columns(trace: "Trace") -> Floats:
     """Return a unit force along each axis of the sensor, in the frame of the measured values."""
-    if trace.in_sensor_frame or trace.in_tool_frame:
+    if trace.frame != "base":
         return constants(trace)
-    rows = nearest_rows(trace.inputs.time_s, trace.time_s)
-    turned = trace.inputs.sensor_rotation[rows]
+    turned = axes_of("sensor", trace.inputs, trace.time_s)
     return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
 
 
@@ -111,8 +117,7 @@ def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     """Return (k, n, c): the signal's rate times hats over time, for a time law that is slightly off."""
     start, end = trace.time_s[0], trace.time_s[-1]
     knots = np.linspace(start, end, max(2, min(round((end - start) / _KNOTS_S), _MOST_KNOTS) + 1))
-    hats = np.maximum(0.0, 1.0 - np.abs(trace.time_s[:, None] - knots) / (knots[1] - knots[0]))
-    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats[None]
+    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats(trace.time_s, knots)
     return columns * sigma(mismatch.clock_s)
 
 
@@ -136,28 +141,44 @@ def joint_trace(
 
     ``plus`` less ``minus`` are the signals of the model; ``sigma_rad`` is the stated noise.
     """
-    recorded = np.isfinite(values).all(axis=0) & _moves(table)
+    columns = np.flatnonzero(np.isfinite(values).all(axis=0) & _moves(table)).tolist()
+    names = [JOINTS[column] for column in columns]
+    trace = _trace(link, pair, table, values[:, columns], DEG_PER_RAD, names, columns, plus, base, sigma_rad)
+    return replace(trace, minus=minus) if columns and len(trace.time_s) else None
+
+
+def _trace(
+    link: Link,
+    pair: Pair,
+    table: Measured,
+    values: Floats,
+    factor: float,
+    components: Sequence[str],
+    columns: Sequence[int],
+    plus: str,
+    base: Sequence[Applied],
+    sigma: float | None,
+) -> Trace:
+    """Return the usable rows of values (n, k) of a table."""
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
-    if not recorded.any() or len(rows) == 0:
-        return None
-    columns = tuple(np.flatnonzero(recorded).tolist())
+    # a log alone may begin in motion: near to its ends its model is not known
+    ends_s = _LIMITS.log_ends_s if pair.from_log and not pair.still else 0.0
+    rows, segments = usable_rows(table, stamps, pair.inputs, ends_s)
     return Trace(
         link=link,
         run=pair.name,
         run_number=pair.number,
-        factor=DEG_PER_RAD,
-        components=tuple(JOINTS[column] for column in columns),
-        columns=columns,
+        factor=factor,
+        components=tuple(components),
+        columns=tuple(columns),
         plus=plus,
-        minus=minus,
         inputs=pair.inputs,
         simulator=pair.simulator,
         base=tuple(base),
         time_s=stamps[rows],
-        measured=values[np.ix_(rows, np.array(columns))],
+        measured=values[rows],
         segments=segments,
-        declared_sigma=sigma_rad,
+        declared_sigma=sigma,
     )
 
 
@@ -185,28 +206,9 @@ def vector_trace(
 
     ``plus`` is the signal of the model; ``sigma`` is the stated noise.
     """
-    stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
-    trace = Trace(
-        link=link,
-        run=pair.name,
-        run_number=pair.number,
-        factor=1.0,
-        components=("x", "y", "z"),
-        columns=(0, 1, 2),
-        plus=plus,
-        inputs=pair.inputs,
-        simulator=pair.simulator,
-        base=tuple(base),
-        time_s=stamps[rows],
-        measured=values[rows],
-        segments=segments,
-        declared_sigma=sigma,
-        in_sensor_frame=frame == "sensor",
-        in_tool_frame=frame == "tcp",
-        still=pair.still,
-    )
-    return with_rows(trace, ~at_edges(pair.inputs, trace.time_s))
+    trace = _trace(link, pair, table, values, 1.0, "xyz", range(3), plus, base, sigma)
+    trace = with_rows(trace, ~at_edges(pair.inputs, trace.time_s))
+    return replace(trace, frame=frame, still=pair.still)
 
 
 def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
@@ -214,25 +216,12 @@ def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
 
     Removal finds an edge of the cut to a sample; within it the force is right or wrong by all of itself.
     """
-    force = inputs.force_base_N
-    largest = float(np.linalg.norm(force, axis=1).max(initial=0.0))
-    if largest == 0.0:
-        return np.zeros(len(time_s), dtype=np.bool_)
-    own_s = inputs.time_s
-    later = np.stack([np.interp(own_s + _LIMITS.jump_s, own_s, column) for column in force.T], axis=1)
-    jumps = own_s[np.linalg.norm(later - force, axis=1) > _LIMITS.jump_share * largest] + _LIMITS.jump_s / 2.0
-    if len(jumps) == 0:
-        return np.zeros(len(time_s), dtype=np.bool_)
-    after = np.clip(np.searchsorted(jumps, time_s), 1, len(jumps) - 1) if len(jumps) > 1 else 0
-    before = np.maximum(after - 1, 0)
-    nearest = np.minimum(np.abs(time_s - jumps[after]), np.abs(time_s - jumps[before]))
+    jumps = inputs.time_s[force_jumps(inputs)] + _LIMITS.jump_s / 2.0
+    jumps = np.concatenate([[-np.inf], jumps, [np.inf]])
+    after = np.searchsorted(jumps, time_s)
+    nearest = np.minimum(jumps[after] - time_s, time_s - jumps[after - 1])
     near: Bools = nearest < _LIMITS.jump_left_out_s
     return near
-
-
-def _ends_s(pair: Pair) -> float:
-    """Return how near to the ends of its model a row is left out: a log alone may begin in motion."""
-    return _LIMITS.log_ends_s if pair.from_log and not pair.still else 0.0
 
 
 class TimingLink(Link):
@@ -436,7 +425,7 @@ def _with_free_controller(context: Context, servo: Verdict) -> Context:
 def _clock(judged: Verdict | None, target: str) -> Applied | None:
     """Return the named clock of a table or of columns."""
     named = judged.applied if judged is not None else ()
-    return next((one for one in named if one.effect.is_clock and one.target == target), None)
+    return next((applied for applied in named if applied.effect.is_clock and applied.target == target), None)
 
 
 def _offset_s(clock: Applied) -> float:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.core import FLOATS, INT, INTS, OUT_FLOATS, core_function
@@ -43,9 +44,10 @@ def innovation_gains(
     transition = transition_of(a, slow)
     order = max(len(a), 1)
     variance = np.zeros_like(transition)
-    variance[:order, :order] = _stationary(transition[:order, :order], scale)
     driven = np.zeros_like(transition)
     driven[0, 0] = scale**2
+    short = slice(order), slice(order)
+    variance[short] = solve_discrete_lyapunov(transition[short], driven[short], method="direct")
     for i, (pole, sigma) in enumerate(slow, start=order):
         variance[i, i] = sigma**2
         driven[i, i] = sigma**2 * (1.0 - pole**2)
@@ -87,15 +89,6 @@ def innovations(
         weights = 1.0 / np.sqrt(s)
         _innovations(values, rows, feedback, poles, gains, weights, *states, out)
     return out
-
-
-def _stationary(transition: Floats, scale: float) -> Floats:
-    """Return P (m, m) = F·P·Fᵀ + Q of the autoregressive states, Q the variance of the first one."""
-    count = len(transition)
-    driven = np.zeros(count * count)
-    driven[0] = scale**2
-    system = np.eye(count * count) - np.kron(transition, transition)
-    return np.asarray(np.linalg.solve(system, driven), dtype=np.float64).reshape(count, count)
 
 
 _LIMITS = THRESHOLDS.noise
@@ -343,10 +336,7 @@ def _short_autocovariance(a: Floats, count: int) -> Floats:
 
 def _stable(a: Floats) -> Floats:
     """Return the coefficients with all poles within the largest that is allowed."""
-    companion = np.zeros((len(a), len(a)))
-    companion[0] = a
-    companion[1:, :-1] = np.eye(len(a) - 1)
-    largest = float(np.abs(np.linalg.eigvals(companion)).max())
+    largest = float(np.abs(np.roots(np.append(1.0, -a))).max(initial=0.0))
     most = _LIMITS.noise_largest_pole
     if largest <= most:
         return a

@@ -30,9 +30,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.compare.events import line_at
+from gcode2krl.gap.compare.events import jump_within, line_at
 from gcode2krl.gap.compare.interpolation import usual_step_s
-from gcode2krl.gap.compare.jumps import jump_within
 from gcode2krl.gap.compare.trace import Event, Trace, Whose
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS

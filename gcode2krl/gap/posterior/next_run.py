@@ -321,7 +321,7 @@ class Bench:
             first=factor * float(values[0]),
             second=factor * float(values[1]),
             is_change=is_change,
-            unit=self.trace.unit,
+            unit=self.trace.link.unit,
             signal=self.trace.signal,
             noise=factor * float(sigma[column]),
             is_open=(first.is_open, second.is_open),
