@@ -455,9 +455,9 @@ class Grid:
             if scale > 0.0:
                 yield Place(f"A{joint + 1}", Where.JOINT, tuple(each / scale for each in lifted), joint)
 
-    def families(self, on: Dependence | None = None) -> Iterator[Family]:
-        """Yield every family that is no step and no tone; those on one input where it is stated."""
-        for place in self.places:
+    def families(self, on: Dependence | None = None, at: str | None = None) -> Iterator[Family]:
+        """Yield every family that is no step and no tone; those on one input, at one place, where stated."""
+        for place in (each for each in self.places if at in (None, each.name)):
             for of, functions in self._functions(place):
                 if functions.width and on in (None, of):
                     yield Family(place, of, *place.lifted(functions), directions=place.width)
@@ -465,7 +465,7 @@ class Grid:
                 yield from self._of_the_pose(place)
             elif place.width > 1:
                 yield from self._of_the_signal(place)
-        if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN):
+        if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN) and at in (None, TIMING):
             yield from self._of_the_plan(self._timing)
 
     # Functions at a place

@@ -21,7 +21,7 @@ FORCED = replace(
 
 def found(on, at="A2", inputs=FORCED):
     one = trace(np.zeros((500, 6)), inputs=inputs)
-    return against(one, np.arange(500), at, frozenset(on))
+    return against(one, at, frozenset(on))
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def found(on, at="A2", inputs=FORCED):
     [
         (Dependence.OWN_ANGLE, "A2", "angle of A2 (deg)", np.degrees(joints(TIME_S)[:, 1])),
         (Dependence.MOTOR_ANGLE, "A3", "angle of A3 (deg)", np.degrees(joints(TIME_S)[:, 2])),
-        (Dependence.FORCE, None, "predicted force (N)", np.full(500, 50.0)),
+        (Dependence.FORCE, None, "force (N)", np.full(500, 50.0)),
         (Dependence.TRAVEL, None, "travel (m)", 0.01 * TIME_S),
         (Dependence.RUN_TIME_STEP, None, "time in the run (s)", TIME_S),
         (Dependence.WALL_CLOCK, None, "time since the first run's start (h)", 0.5 + TIME_S / 3600.0),
@@ -46,9 +46,9 @@ def test_inputs(on, at, name, values):
 def test_speeds_of_a_joint_and_of_the_tip():
     shown = found({Dependence.VELOCITY}, "A5")
     np.testing.assert_allclose(shown.values[1:-1], np.degrees(joint_rates(TIME_S)[1:-1, 4]), atol=0.02)
-    assert found({Dependence.VELOCITY}, None).name == "speed of the tip (mm/s)"
+    assert found({Dependence.VELOCITY}, None).name == "velocity (mm/s)"
     assert found({Dependence.ACCELERATION}, "A5").name == "acceleration of A5 (deg/s²)"
-    assert found({Dependence.ACCELERATION}, None).name == "acceleration of the tip (mm/s²)"
+    assert found({Dependence.ACCELERATION}, None).name == "acceleration (mm/s²)"
 
 
 def test_torque_is_the_work_of_the_force_per_turn():

@@ -56,7 +56,7 @@ def test_the_joint_of_the_cause_is_shown_even_where_another_has_more():
     at = Depends("A4", frozenset({Dependence.VELOCITY}))
     evidence = found([residual(values)], depends=at)
     assert evidence.component == "A4"
-    assert evidence.runs[0].against.name == "speed of A4 (deg/s)"
+    assert evidence.runs[0].against.name == "velocity of A4 (deg/s)"
 
 
 def test_without_a_known_robot_there_is_no_path_and_no_tip():

@@ -8,7 +8,6 @@ loads matplotlib, so it is imported only where a picture is asked for.
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -71,7 +70,7 @@ def write_pictures(gap: Gap, folder: Path, inputs: Iterable[str | Path] = ()) ->
         return []
     make_folder(folder)
     figures = {folder / f"gap_{_file_name(run.run)}.png": run_figure(gap, run) for run in evidence.runs}
-    write_together({file: partial(_save, figure) for file, figure in figures.items()}, inputs)
+    write_together({file: picture_bytes(figure) for file, figure in figures.items()}, inputs)
     return list(figures)
 
 
@@ -86,7 +85,9 @@ def figure_of_run(gap: Gap, run: str | None) -> Figure:
 
 def run_figure(gap: Gap, run: RunEvidence) -> Figure:
     """Draw one run: the residual over time, the path coloured by it, and its dependence if one is known."""
-    evidence = _of(gap)
+    evidence = gap.evidence
+    if evidence is None:
+        raise ValueError("nothing was compared, so there is nothing to draw")
     signal = SIGNALS.get(evidence.signal, evidence.signal)
     title = f"{run.run}: measured minus predicted, {signal}"
     with look():
@@ -228,12 +229,6 @@ def largest_size(evidence: Evidence) -> float:
     return max(float(np.percentile(sizes, 99.0)), 1e-12)
 
 
-def _of(gap: Gap) -> Evidence:
-    if gap.evidence is None:
-        raise ValueError("nothing was compared, so there is nothing to draw")
-    return gap.evidence
-
-
 def _add_lines(axes: Axes, run: RunEvidence) -> None:
     """Add G-code lines along the top."""
     if not np.any(run.line > 0):
@@ -263,10 +258,6 @@ def _say(axes: Axes, words: str) -> None:
 
 def _file_name(run: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in run)
-
-
-def _save(figure: Figure, file: Path) -> None:
-    figure.savefig(file, dpi=DPI, format="png")
 
 
 _COLOURS = 24
@@ -372,7 +363,7 @@ def scale_colours() -> list[str]:
 
 def rows_of(run: RunEvidence) -> Any:
     """Return the rows that are drawn, at most 900."""
-    return np.arange(0, len(run.time_s), max(1, -(-len(run.time_s) // _MOST_POINTS)))
+    return _some(len(run.time_s), _MOST_POINTS)
 
 
 def _view(place: Floats, colour: Any, axes: tuple[int, int]) -> View:

@@ -126,7 +126,7 @@ def rms_length(vectors: Iterable[Floats]) -> float:
 
 
 def hats(values: Floats, knots: Floats) -> Floats:
-    """Return functions (n, k) of values (n,), each 1 at one of evenly spaced knots (k,) and 0 at the others."""
+    """Return functions (n, k) of values (n,), each 1 at one of evenly spaced knots (k,), 0 at the others."""
     made: Floats = np.maximum(0.0, 1.0 - np.abs(values[:, None] - knots) / (knots[1] - knots[0]))
     return made
 

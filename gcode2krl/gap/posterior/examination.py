@@ -178,9 +178,7 @@ def size_of_gap(
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
-        loud_in_step=max(
-            each(likelihood, structured) for each in (_loud_in_step, _rough_joint, _loud_at_work)
-        ),
+        loud_in_step=max(ask(likelihood, structured) for ask in (_loud_in_step, _rough_joint, _loud_at_work)),
     )
 
 
@@ -502,7 +500,9 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
         context.seed,
         context.joints,
         tuple(
-            each for each in context.judgements if each.verdict == "unexplained" and not each.link.tells_time
+            judged
+            for judged in context.judgements
+            if judged.verdict == "unexplained" and not judged.link.tells_time
         ),
     )
 

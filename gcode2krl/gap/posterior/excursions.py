@@ -97,8 +97,9 @@ def _windows(likelihood: Likelihood, residuals: Sequence[Floats]) -> Iterator[_W
         ]
         searched = list(product(_LIMITS.excursion_widths_s, _HALVES))
         for width_s, halves in searched:
-            for each in _of_width(likelihood.traces, rows, width_s, halves, len(groups) * len(searched)):
-                yield _Window(*each, halves, group)
+            searches = len(groups) * len(searched)
+            for window in _of_width(likelihood.traces, rows, width_s, halves, searches):
+                yield _Window(*window, halves, group)
 
 
 def _of_width(
@@ -194,8 +195,8 @@ def _gain(values: Floats, *columns: Floats) -> float:
 
 
 def _with_events(trace: Trace, number: int, windows: Sequence[_Window], residual: Floats) -> Trace:
-    own = tuple(_event(trace, each, residual) for each in windows if each.number == number)
-    return replace(trace, events=(*trace.events, *own)) if own else trace
+    events = tuple(_event(trace, each, residual) for each in windows if each.number == number)
+    return replace(trace, events=(*trace.events, *events)) if events else trace
 
 
 def _event(trace: Trace, window: _Window, residual: Floats) -> Event:
