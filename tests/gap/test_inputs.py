@@ -1,4 +1,4 @@
-"""Another rounding of corners is a sum of columns, beside them and in time; moments alone are a gap."""
+"""Admissible inputs: loads of the gears, what was logged, memory, corners."""
 
 import io
 from dataclasses import replace
@@ -9,12 +9,71 @@ import pytest
 from gcode2krl import load_cell
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.inputs import gradient
-from gcode2krl.gap.compare.inputs import Corners
+from gcode2krl.gap.compare.inputs import Admissible, Corners
 from gcode2krl.gap.compare.pair import Simulator, _shared, with_corners
 from gcode2krl.gap.posterior.examination import moments_off
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
-from tests.gap.constructed import trace
+from tests.gap.constructed import motion, trace
+
+# Admissible inputs: loads of the gears with and without weight, what was logged, memory
+
+
+COUNT = 500
+PUSH_N = np.array([80.0, -30.0, 20.0])
+
+
+def inputs_of(**more):
+    return Admissible(trace(np.zeros((COUNT, 1)), inputs=replace(motion(), **more)))
+
+
+def loaded(mass_kg):
+    cell = motion().cell
+    load = cell.load.model_copy(update={"mass_kg": mass_kg, "x_mm": 0.0, "y_mm": 0.0, "z_mm": 0.0})
+    return cell.model_copy(update={"load": load})
+
+
+def test_gears_carry_the_weight_and_the_arm_beside_the_cut_only_the_force():
+    """m·g at the flange about A2, whose arm is the way along the floor from A2's axis to the flange."""
+    light = inputs_of(force_base_N=np.tile(PUSH_N, (COUNT, 1)), cell=loaded(0.0))
+    heavy = inputs_of(force_base_N=np.tile(PUSH_N, (COUNT, 1)), cell=loaded(50.0))
+    np.testing.assert_allclose(light.load_torque_Nm, heavy.load_torque_Nm)
+    added = heavy.torque_Nm - light.torque_Nm
+    assert np.abs(added[:, 0]).max() < 0.1 * np.abs(added[:, 1]).max()  # inertia alone turns A1
+    assert 0.3 < np.abs(added[:, 1]).max() / (50.0 * 9.81) < 4.0  # metres of arm
+
+
+def test_a_logged_torque_comes_before_the_modelled_one():
+    logged = np.column_stack([np.sin(motion().time_s + joint) for joint in range(6)])
+    own = inputs_of(torque_Nm=logged, force_base_N=np.tile(PUSH_N, (COUNT, 1)))
+    np.testing.assert_allclose(own.torque_Nm, logged)
+    assert own.load_torque_Nm.any()
+    assert own.torque_with_memory(2).shape == (COUNT, 6)
+
+
+def test_memory_of_a_torque_lags_at_each_turn_and_not_between():
+    rising = np.column_stack([np.linspace(0.0, 1.0, COUNT)] * 6)
+    memory = inputs_of(torque_Nm=rising).torque_with_memory(0)
+    # a play follows a rising torque half its width behind, once it has been taken up
+    assert memory[-1] == pytest.approx([0.0125, 0.025, 0.05, 0.1, 0.2, 0.4])
+
+
+def test_directions_are_those_of_each_joint():
+    rates = np.gradient(motion().q_cmd_rad, motion().time_s, axis=0)
+    fast = np.abs(rates) > 0.3 * np.abs(rates).max(axis=0)
+    np.testing.assert_array_equal(inputs_of().directions[fast], np.sign(rates[fast]))
+
+
+def test_without_a_force_nothing_presses_and_without_a_thermometer_there_is_no_temperature():
+    bare = inputs_of()
+    assert not bare.presses
+    assert bare.temperature_C.shape == (COUNT, 0)
+    warm = inputs_of(temperature_C=np.linspace(20.0, 25.0, COUNT)[:, None])
+    assert warm.temperature_C[-1, 0] == pytest.approx(25.0)
+
+
+# Another rounding of corners is a sum of columns, beside them and in time; moments alone are a gap
+
 
 SAME_SPEED = "G1 X80 F3000\nG1 Y60\nG1 X10 Y20\nG1 Y0\n"
 OTHER_SPEEDS = "G1 X80 F9000\nG1 Y60 F3000\nG1 X10 Y20 F9000\nG1 Y0 F3000\n"
