@@ -272,9 +272,7 @@ def smooth_sum(inputs: Sequence[Floats]) -> Functions:
     """Return functions of each of several inputs (n, c), whose sum a deviation may be."""
     parts = [smooth([each[:, i] for each in inputs]) for i in range(inputs[0].shape[1])]
     used = [part for part in parts if part.width] or parts[:1]
-    columns = tuple(
-        np.concatenate(each, axis=1) for each in zip(*(part.columns for part in used), strict=True)
-    )
+    columns = tuple(_side_by_side(*(part.columns for part in used)))
     return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
 
 
@@ -615,14 +613,12 @@ class Grid:
             for trace in self.traces
         ]
         passed = [inputs.corners_passed for inputs in self.inputs]
-        widths = {program: own.shape[1] for program, own in zip(programs, passed, strict=True)}
-        return [
-            np.concatenate(
-                [own if each == program else np.zeros((len(own), width)) for each, width in widths.items()],
-                axis=1,
-            )
-            for program, own in zip(programs, passed, strict=True)
-        ]
+        widths = {program: columns.shape[1] for program, columns in zip(programs, passed, strict=True)}
+        firsts = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
+        wide = [np.zeros((len(columns), sum(widths.values()))) for columns in passed]
+        for program, columns, whole in zip(programs, passed, wide, strict=True):
+            whole[:, firsts[program] : firsts[program] + widths[program]] = columns
+        return wide
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""

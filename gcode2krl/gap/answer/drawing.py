@@ -339,21 +339,22 @@ def strip(evidence: Evidence, run: RunEvidence, intervals: Sequence[IntervalResu
 def points(run: RunEvidence) -> dict[str, list[Any]]:
     """Return what the slider shows at each of its places: time, line, sizes, and where each view has it."""
     rows = rows_of(run)
-    columns: dict[str, list[Any]] = {
+    at = []
+    if run.position_mm is not None:
+        flat = (_flat(run.position_mm[rows], axes) for axes in views_of(run))
+        at = [[[round(float(x), 2), round(float(y), 2)] for x, y in place] for place in flat]
+    return {
         "t": [round(float(value), 3) for value in run.time_s[rows]],
-        "line": [int(value) for value in run.line[rows]],
+        "line": run.line[rows].tolist(),
         "before": [float(f"{value:.3g}") for value in run.size_before[rows]],
         "after": [float(f"{value:.3g}") for value in run.size_after[rows]],
-        "at": [],
+        "at": at,
     }
-    if run.position_mm is not None:
-        for first, second in views_of(run):
-            place = run.position_mm[rows]
-            scale = _stretch(place, (first, second))
-            columns["at"].append(
-                [[round(float(x), 2), round(float(-scale * y), 2)] for x, y in place[:, [first, second]]]
-            )
-    return columns
+
+
+def _flat(place: Floats, axes: tuple[int, int]) -> Floats:
+    """Return places (n, 3) along two axes (n, 2), y downwards."""
+    return np.stack([place[:, axes[0]], -_stretch(place, axes) * place[:, axes[1]]], axis=1)
 
 
 def scale_colours() -> list[str]:
@@ -367,8 +368,7 @@ def rows_of(run: RunEvidence) -> Any:
 
 
 def _view(place: Floats, colour: Any, axes: tuple[int, int]) -> View:
-    scale = _stretch(place, axes)
-    flat = np.stack([place[:, axes[0]], -scale * place[:, axes[1]]], axis=1)
+    scale, flat = _stretch(place, axes), _flat(place, axes)
     low, span = flat.min(axis=0), np.ptp(flat, axis=0)
     margin = _MARGIN * max(float(span.max()), 1e-6)
     low, span = low - margin, span + 2.0 * margin
@@ -420,18 +420,6 @@ _VERDICTS = {
 }
 
 
-@dataclass(frozen=True)
-class RunOnPage:
-    """One run as the page shows it."""
-
-    name: str
-    views: list[View]
-    strip: Strip
-    points: dict[str, list[Any]]
-    picture: str
-    """PNG in base 64."""
-
-
 def write_page(gap: Gap, file: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Write the page; raises `NotUnderstoodError` where the file cannot be written or is an input."""
     write_together({file: page(gap).encode("utf-8")}, inputs)
@@ -464,14 +452,15 @@ def page(gap: Gap) -> str:
     )
 
 
-def _run(gap: Gap, evidence: Evidence, run: RunEvidence) -> RunOnPage:
-    return RunOnPage(
-        name=run.run,
-        views=views(evidence, run),
-        strip=strip(evidence, run, gap.where.intervals),
-        points=points(run),
-        picture=b64encode(picture_bytes(run_figure(gap, run))).decode("ascii"),
-    )
+def _run(gap: Gap, evidence: Evidence, run: RunEvidence) -> dict[str, Any]:
+    """Return one run as the page shows it, its picture as PNG in base 64."""
+    return {
+        "name": run.run,
+        "views": views(evidence, run),
+        "strip": strip(evidence, run, gap.where.intervals),
+        "points": points(run),
+        "picture": b64encode(picture_bytes(run_figure(gap, run))).decode("ascii"),
+    }
 
 
 def _cause(cause: CauseResult) -> dict[str, Any]:

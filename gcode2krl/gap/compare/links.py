@@ -42,7 +42,7 @@ def _stacked(values: Floats) -> Floats:
     return np.ascontiguousarray(values.T)
 
 
-def constants(trace: "Trace") -> Floats:
+def constants(trace: Trace) -> Floats:
     """Return (k, n, k): column j is one in component j."""
     n, k = trace.shape
     return np.repeat(np.eye(k)[:, None, :], n, axis=1)
@@ -57,7 +57,7 @@ def component_columns(values: Floats) -> Floats:
     return columns
 
 
-def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def play_start_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, k): where in its play each joint stands when the run begins, even between its ends.
 
     Until the play has been crossed once (Krasnosel'skii and Pokrovskii 1989); that it is even is assumed.
@@ -72,7 +72,7 @@ def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     return component_columns(begun_rad * sigma(1.0))
 
 
-def force_zero_columns(trace: "Trace") -> Floats:
+def force_zero_columns(trace: Trace) -> Floats:
     """Return a unit force along each axis of the sensor, in the frame of the measured values."""
     if trace.frame != "base":
         return constants(trace)
@@ -80,7 +80,7 @@ def force_zero_columns(trace: "Trace") -> Floats:
     return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
 
 
-def frame_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def frame_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
     position = trace.nominal
     turned = np.zeros((3, len(position), 6))
@@ -108,12 +108,12 @@ def load_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     return np.stack(columns, axis=2)
 
 
-def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def clock_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, 1): what the clock of the table does to the signal, to first order."""
     return -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
 
 
-def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def time_law_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, c): the signal's rate times hats over time, for a time law that is slightly off."""
     start, end = trace.time_s[0], trace.time_s[-1]
     knots = np.linspace(start, end, max(2, min(round((end - start) / _KNOTS_S), _MOST_KNOTS) + 1))
@@ -127,7 +127,7 @@ JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 
 
 def joint_trace(
-    link: "Link",
+    link: Link,
     pair: Pair,
     table: Controller,
     values: Floats,
@@ -192,7 +192,7 @@ def _moves(table: Controller) -> Bools:
 
 
 def vector_trace(
-    link: "Link",
+    link: Link,
     pair: Pair,
     table: Measured,
     values: Floats,
@@ -588,40 +588,33 @@ class SurfaceLink(Link):
 
     def points(self, pair: Pair, base: Sequence[Applied] = ()) -> SurfacePoints | None:
         """Return the scanned points of a run with a prediction; None without a scan or if the tool turns."""
-        if not pair.known_robot or pair.from_log:
+        scan, inputs = pair.run.scan, pair.inputs
+        if scan is None or not pair.known_robot or pair.from_log:
             return None
-        return _assigned(pair, base)
-
-
-def _assigned(pair: Pair, base: Sequence[Applied]) -> SurfacePoints | None:
-    """Return the points of a run's scan beside the surface that its tip has swept."""
-    scan, inputs = pair.run.scan, pair.inputs
-    axis = inputs.tool_rotation[:, :, 2]
-    cuts: Bools = np.any(inputs.force_base_N, axis=1)
-    if scan is None or not cuts.any() or np.ptp(axis, axis=0).max() > _LIMITS.scan_straight:
-        return None
-    turn = _upright(-axis[0] if axis[0, 2] < 0.0 else axis[0])
-    tip, bent = (values[cuts] @ turn.T for values in _tips(pair, base))
-    radius, corner = _cutters(inputs, cuts)
-    points = scan.position_mm @ turn.T
-    feet = [_foot(point, tip, radius, corner) for point in points]
-    kept = [foot for foot in feet if foot is not None]
-    if len(kept) < _LIMITS.scan_least_points:
-        return None
-    normal = np.array([foot.normal for foot in kept])
-    return SurfacePoints(
-        deviation=np.array([foot.deviation for foot in kept]),
-        wall=np.array([foot.is_wall for foot in kept]),
-        normal=normal,
-        deflection=np.sum(bent[[foot.row for foot in kept]] * normal, axis=1),
-        place=points[[foot is not None for foot in feet]],
-    )
-
-
-def _cutters(inputs: Inputs, cuts: Bools) -> tuple[Floats, Floats]:
-    """Return the radius and the height of the corner of the cutter at each cutting sample."""
-    tools = [inputs.cell.tool[int(number)] for number in inputs.tool[cuts]]
-    return np.array([tool.diameter_mm / 2.0 for tool in tools]), np.array([_corner(tool) for tool in tools])
+        axis = inputs.tool_rotation[:, :, 2]
+        cuts: Bools = np.any(inputs.force_base_N, axis=1)
+        if not cuts.any() or np.ptp(axis, axis=0).max() > _LIMITS.scan_straight:
+            return None
+        turn = _upright(-axis[0] if axis[0, 2] < 0.0 else axis[0])
+        tip, bent = (values[cuts] @ turn.T for values in _tips(pair, base))
+        tools = [inputs.cell.tool[int(number)] for number in inputs.tool[cuts]]
+        radius = np.array([tool.diameter_mm / 2.0 for tool in tools])
+        # heights above the tip from which the cutters have their whole radius
+        corner = np.array([tool.corner_radius_mm for tool in tools])
+        corner = np.where([tool.kind == "ball" for tool in tools], radius, corner)
+        points = scan.position_mm @ turn.T
+        feet = [_foot(point, tip, radius, corner) for point in points]
+        kept = [foot for foot in feet if foot is not None]
+        if len(kept) < _LIMITS.scan_least_points:
+            return None
+        normal = np.array([foot.normal for foot in kept])
+        return SurfacePoints(
+            deviation=np.array([foot.deviation for foot in kept]),
+            wall=np.array([foot.is_wall for foot in kept]),
+            normal=normal,
+            deflection=np.sum(bent[[foot.row for foot in kept]] * normal, axis=1),
+            place=points[[foot is not None for foot in feet]],
+        )
 
 
 class _Foot(NamedTuple):
@@ -664,12 +657,6 @@ def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
     offset = table.position_mm - linear(own_s, inputs.time_s, tip)
     smooth = running_mean(offset, round(_LIMITS.scan_smooth_s / usual_step_s(own_s)))
     return tip + linear(inputs.time_s, own_s, smooth), np.zeros_like(bent)
-
-
-def _corner(tool: object) -> float:
-    """Return the height above the tip from which a cutter has its whole radius."""
-    kind, diameter = getattr(tool, "kind", "flat"), float(getattr(tool, "diameter_mm", 0.0))
-    return diameter / 2.0 if kind == "ball" else float(getattr(tool, "corner_radius_mm", 0.0))
 
 
 def _upright(up: Floats) -> Floats:

@@ -68,7 +68,7 @@ def noise_of(
     residuals = source.without_spikes([trace.measured - trace.sample(applied) for trace in traces])
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
     slow = [
-        _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
+        _of_rows(slow_parts_of(blocks, floor), traces[0]) for blocks, floor in zip(means, floors, strict=True)
     ]
     if traces[0].is_shown_at_tip or _in_few_joints(traces[0], slow):
         slow = [()] * len(slow)
@@ -150,13 +150,9 @@ class _Explained:
         width = sum(part.shape[2] for part in parts)
         self._columns = [list(_runs_of_columns(parts, j)) for j in range(trace.shape[1])]
         gram = np.zeros((width, width))
-        for of_component in self._columns:
-            used = np.concatenate(
-                [np.zeros(0, dtype=int), *(np.arange(at.start, at.stop) for at, _ in of_component)]
-            )
-            columns = np.concatenate(
-                [np.zeros((len(trace.time_s), 0)), *(run for _, run in of_component)], axis=1
-            )
+        for of_component in filter(None, self._columns):
+            used = np.concatenate([np.arange(at.start, at.stop) for at, _ in of_component])
+            columns = np.concatenate([run for _, run in of_component], axis=1)
             gram[np.ix_(used, used)] += columns.T @ columns
         self._kept = np.flatnonzero(np.diag(gram))
         self._scale = np.sqrt(np.diag(gram)[self._kept])
@@ -367,9 +363,8 @@ def _few(
     """
     from scipy.special import fdtrc
 
-    turned, variances = (
-        np.concatenate(each) for each in zip(*_turned(traces, signatures, nuisance), strict=True)
-    )
+    of_traces = zip(*_turned(traces, signatures, nuisance), strict=True)
+    turned, variances = map(np.concatenate, of_traces)
     sigmas = rms(turned[:, -1]) * _SIGMAS
     count, taken = len(turned), list[int]()
     while True:

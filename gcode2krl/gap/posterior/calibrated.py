@@ -160,7 +160,7 @@ def features_of(
         shrink_together=held_out.shrink_together,
         share_left=held_out.share_left,
         causes=sum(
-            examination.gains[each] >= _LIMITS.counted_share * gain for each in examination.cause_numbers
+            examination.gains[cause] >= _LIMITS.counted_share * gain for cause in examination.cause_numbers
         ),
         gap_p=gap_p,
         conditions_failed=[
@@ -412,8 +412,8 @@ def _of_signal(unnamed: Rest, component: int | None, larger_links: int) -> list[
     # one input at a place excludes another
     at_first = max(_of_place(p), clipped(sum(q for q, there in zip(shares, is_there, strict=True) if there)))
     return [
-        FamilyProbability(each, of_each, q, at_first if there else min(_of_place(q), 1.0 - at_first))
-        for each, of_each, q, there in zip(evidences, features, shares, is_there, strict=True)
+        FamilyProbability(evidence, numbers, q, at_first if there else min(_of_place(q), 1.0 - at_first))
+        for evidence, numbers, q, there in zip(evidences, features, shares, is_there, strict=True)
     ]
 
 
