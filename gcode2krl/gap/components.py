@@ -599,10 +599,11 @@ class Grid:
         """Yield what a controller makes of corners, speeds and stops by laws of its own."""
         inputs, at = self.inputs, list(self.traces[0].columns)
         sigma = float(np.mean(self._sigma))
-        late, _ = place.lifted(free([each.late_by_rounding for each in inputs]))
-        rounded = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in inputs]
+        late, _ = place.lifted(free([each.at(each.corners.late_by_rounding) for each in inputs]))
+        rounded = [np.moveaxis(each.at(each.corners.roundings)[:, :, at], 2, 0) for each in inputs]
         yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(rounded, sigma)]))
-        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in inputs])))
+        ramps = free([each.at(each.corners.late_by_ramps) for each in inputs])
+        yield Family(place, Dependence.VELOCITY, *place.lifted(ramps))
         yield Family(place, Dependence.STOPS, *place.lifted(free(self._passed)))
 
     @property
@@ -612,7 +613,7 @@ class Grid:
             b"" if trace.inputs.targets is None else trace.inputs.targets.position_mm.tobytes()
             for trace in self.traces
         ]
-        passed = [inputs.corners_passed for inputs in self.inputs]
+        passed = [inputs.corners.passed(inputs.nearest) for inputs in self.inputs]
         widths = {program: columns.shape[1] for program, columns in zip(programs, passed, strict=True)}
         firsts = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
         wide = [np.zeros((len(columns), sum(widths.values()))) for columns in passed]

@@ -154,7 +154,7 @@ def _answered(context: Context, begin: Begin) -> Gap:
         if planned.has_actual_joints_alone
     ]
     context = _with_data(on_time)
-    rough = _rough(context)
+    rough = {link: rough_spans(link.traces(context.pairs, link.base(context))) for link in SIGNALS}
     shares: dict[str, float] = {}
     links = begin("links")
     for count, link in enumerate(SIGNALS):
@@ -239,23 +239,13 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
     return [Issue("note", "joints-actual-alone", 0, words), *late]
 
 
-def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:
-    """Return of each table and run the times at which it is rough, of links that are measured directly."""
-    rough: dict[str, dict[str, list[Span]]] = {}
-    for link in SIGNALS:
-        traces = link.traces(context.pairs, link.base(context))
-        for run, spans in rough_spans(traces).items():
-            rough.setdefault(link.table, {}).setdefault(run, []).extend(spans)
-    return rough
-
-
-def _elsewhere(rough: Mapping[str, Mapping[str, Sequence[Span]]], link: Link) -> dict[str, list[Span]]:
+def _elsewhere(rough: Mapping[Link, Mapping[str, Sequence[Span]]], link: Link) -> dict[str, list[Span]]:
     """Return of each run the times at which tables other than a link's own are rough."""
-    others: dict[str, list[Span]] = {}
-    for table, runs in rough.items():
-        for run, spans in runs.items() if table != link.table else ():
-            others.setdefault(run, []).extend(spans)
-    return others
+    spans: dict[str, list[Span]] = {}
+    for other in (each for each in rough if each.table != link.table):
+        for run in rough[other]:
+            spans.setdefault(run, []).extend(rough[other][run])
+    return spans
 
 
 def _with_data(context: Context) -> Context:

@@ -148,7 +148,11 @@ def _size(
 ) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
-        return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
+        if not slips:
+            return GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
+        slip = slips[0]
+        before, after = slip.rms_before, slip.rms_after
+        return GapSize(signal=slip.link.signal, unit=slip.link.unit, rms_before=before, rms_after=after)
     size, link, factor = largest.told, largest.link, largest.factor
     return GapSize(
         signal=TIMING.signal if _is_timing(largest) else link.signal,
@@ -162,11 +166,6 @@ def _size(
         held_out=largest.held_out,
         per_run=run_sizes(largest, residuals.get(link, ())) if isinstance(largest, Judgement) else (),
     )
-
-
-def _size_of_slip(slip: Slip) -> GapSize:
-    link = slip.link
-    return GapSize(signal=link.signal, unit=link.unit, rms_before=slip.rms_before, rms_after=slip.rms_after)
 
 
 def _is_timing(judgement: Judged) -> bool:

@@ -19,6 +19,7 @@ line).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
@@ -112,8 +113,7 @@ _ROUNDS = 3
 """In which calm rows and the memory that tells them are found from each other."""
 
 
-@dataclass(frozen=True)
-class Slow:
+class Slow(NamedTuple):
     """A part of the noise with v[t] = pole·v[t-1] + …, whose rms is ``sigma``."""
 
     pole: float
@@ -141,16 +141,12 @@ class Noise:
 
     @cached_property
     def _gains(self) -> tuple[Floats, Floats]:
-        return innovation_gains(self.a, self.scale, self._slow, _MOST_SETTLING)
-
-    @property
-    def _slow(self) -> list[tuple[float, float]]:
-        return [(each.pole, each.sigma) for each in self.slow]
+        return innovation_gains(self.a, self.scale, self.slow, _MOST_SETTLING)
 
     def whiten(self, values: Floats, segments: Ints) -> Floats:
         """Return (n, c) filtered to white noise of unit variance, each segment by itself."""
         gains, variances = self._gains
-        return innovations(values, segments, self.a, self._slow, gains, variances)
+        return innovations(values, segments, self.a, self.slow, gains, variances)
 
     def calm_rows(self, values: Floats, segments: Ints) -> Bools:
         """Return which rows (n,) of values (n,) are, whitened, about as loud as the median window."""
@@ -299,7 +295,7 @@ def at_most(noise: Noise, sigma: float) -> Noise:
         beyond = float(np.sqrt(noise.short_sigma**2 - sigma**2))
         short = replace(white(sigma), slow=noise.slow, beyond=beyond)
     most = _LIMITS.noise_most_slow * short.short_sigma
-    return replace(short, slow=tuple(replace(each, sigma=min(each.sigma, most)) for each in short.slow))
+    return replace(short, slow=tuple(Slow(pole, min(sigma, most)) for pole, sigma in short.slow))
 
 
 def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
@@ -308,14 +304,9 @@ def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
         return noise
     a = _stable(2.0 * noise.a - of_drawn.a)
     scale = max(noise.scale**2 / of_drawn.scale, _LIMITS.noise_least_scale * floor)
-    steady = _gain(noise.a) * noise.scale
+    steady = float(np.sqrt(_short_autocovariance(noise.a, 1)[0])) * noise.scale
     sigma = max(noise.short_sigma * steady / of_drawn.short_sigma, floor, scale)
     return Noise(a, scale, sigma, noise.slow)
-
-
-def _gain(a: Floats) -> float:
-    """Return the rms of x for white e of unit variance."""
-    return float(np.sqrt(_short_autocovariance(a, 1)[0]))
 
 
 def _short_autocovariance(a: Floats, count: int) -> Floats:
