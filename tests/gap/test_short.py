@@ -13,7 +13,6 @@ from gcode2krl.gap.noise.short import (
     fit,
     innovation_gains,
     innovations,
-    transition_of,
     unbiased,
     white,
     without_lines,
@@ -193,13 +192,6 @@ def test_without_a_slow_part_it_is_the_autoregressive_filter():
     x = np.random.default_rng(2).standard_normal((50, 1))
     white = innovations(x, np.array([[0, 50]]), A, [], gains, variances)[:, 0]
     np.testing.assert_allclose(white[2:], (x[2:, 0] - A[0] * x[1:-1, 0] - A[1] * x[:-2, 0]) / 0.6, rtol=1e-9)
-
-
-def test_states_are_the_short_parts_lags_and_each_slow_part():
-    np.testing.assert_array_equal(
-        transition_of(A, SLOW), [[0.9, 1.0, 0.0], [-0.3, 0.0, 0.0], [0.0, 0.0, 0.98]]
-    )
-    np.testing.assert_array_equal(transition_of(np.zeros(0), []), [[0.0]])
 
 
 # Tones are taken off noise, and nothing is where there is no tone
