@@ -23,7 +23,7 @@ from gcode2krl.gap.compare.clocks import (
 from gcode2krl.gap.compare.links import PATH
 from gcode2krl.gap.compare.trace import Context
 from gcode2krl.runs import Tracker
-from tests.gap.constructed import controller, joint_rates, joints, motion, noise, pair, trace
+from tests.gap.constructed import controller, joint_rates, joints, motion, noise, pair, table, trace
 
 # Clocks: known offsets come back, and what is no clock is not taken for one
 
@@ -80,9 +80,7 @@ def test_large_offsets_are_found_by_how_the_motion_follows(offset_s):
 def test_a_trackers_clock_is_found_by_its_own_motion():
     tip = joints(STAMPS_S - 1.0)[:, :3]
     lengths = replace(LONG, position_mm=LONG.q_cmd_rad[:, :3])
-    rows = {"row": np.arange(len(STAMPS_S)), "segments": np.array([[0, len(STAMPS_S)]])}
-    table = Tracker(time_s=STAMPS_S, position_mm=tip, **rows)
-    made = pair(lengths, tracker=table)
+    made = pair(lengths, tracker=table(Tracker, STAMPS_S, position_mm=tip))
     assert with_coarse_clocks(made).clock_s == {"tracker": pytest.approx(1.0, abs=0.03)}
 
 

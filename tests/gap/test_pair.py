@@ -28,8 +28,20 @@ from gcode2krl.gap.compare.pair import (
 )
 from gcode2krl.gap.components import Grid
 from gcode2krl.prediction import Prediction
-from gcode2krl.runs import Controller, Force, RunHead, Tracker
-from tests.gap.constructed import Added, applied, cell, controller, joints, motion, noise, pair, stub, trace
+from gcode2krl.runs import Force, RunHead, Tracker
+from tests.gap.constructed import (
+    Added,
+    applied,
+    cell,
+    controller,
+    joints,
+    motion,
+    noise,
+    pair,
+    stub,
+    table,
+    trace,
+)
 
 # A run beside its prediction: stamps, rows, and what was measured in place of the model
 
@@ -50,14 +62,8 @@ def at_own(values):
     return CubicHermiteSpline(STAMPS_S, values, slopes)(np.clip(INPUTS.time_s, STAMPS_S[0], STAMPS_S[-1]))
 
 
-def table(kind, **columns):
-    count = len(STAMPS_S)
-    segments = np.array([[0, count]])
-    return kind(time_s=STAMPS_S, row=np.arange(count), segments=segments, **columns)
-
-
 def test_clock_errors_come_off_the_stamps_of_their_table_alone():
-    tip = table(Tracker, position_mm=np.zeros((len(STAMPS_S), 3)))
+    tip = table(Tracker, STAMPS_S, position_mm=np.zeros((len(STAMPS_S), 3)))
     run = pair(controller=controller(STAMPS_S), tracker=tip)
     later = run.later("tracker", 0.25).later("tracker", 0.05)
     np.testing.assert_allclose(later.stamps(tip), STAMPS_S - 0.3)
@@ -76,9 +82,7 @@ def test_rows_of_the_predictions_time_keep_their_segments():
 
 
 def test_measured_joints_take_the_place_of_the_models_one_by_one():
-    run = pair(
-        controller=controller(STAMPS_S, q_cmd_rad=OWN, q_act_rad=OWN + LAG, q_load_rad=OWN + LAG + TWIST)
-    )
+    run = pair(controller=LOG)
     commanded = run.with_measured_joints("q_cmd").inputs
     np.testing.assert_array_equal(commanded.q_cmd_rad, INPUTS.q_cmd_rad)
     assert commanded.q_act_rad is None
@@ -104,9 +108,7 @@ def test_without_commanded_joints_the_plan_is_what_drives_follow():
 
 
 def test_what_a_links_model_says_goes_before_what_its_encoders_say():
-    run = pair(
-        controller=controller(STAMPS_S, q_cmd_rad=OWN, q_act_rad=OWN + LAG, q_load_rad=OWN + LAG + TWIST)
-    )
+    run = pair(controller=LOG)
     modelled = replace(run, fitted={"q_act_rad": 3.0 * LAG, "q_load_rad": 0.0 * TWIST})
     found = modelled.with_measured_joints("q_load").inputs
     np.testing.assert_allclose(found.q_act_rad, INPUTS.q_cmd_rad + at_own(3.0 * LAG), atol=1e-12)
@@ -134,9 +136,7 @@ def test_a_measured_force_bends_the_arm_as_its_mean_over_50_ms_where_the_cutter_
     inputs = replace(INPUTS, force_base_N=np.where(cuts[:, None], 50.0, 0.0) * np.ones(3), forces=stub())
     own_s = INPUTS.time_s
     force = np.stack([100 * np.sin(own_s), 50 * np.cos(own_s), 20 + 0 * own_s], axis=1)
-    measured = Force(
-        time_s=own_s, row=np.arange(500), segments=np.array([[0, 500]]), force_N=turn.inv().apply(force)
-    )
+    measured = table(Force, own_s, force_N=turn.inv().apply(force))
     run = pair(inputs, RunHead(frames={"force": frame}), force=measured)
     found = run.with_measured_load().inputs.load_base_N
     assert not found[~cuts].any()
@@ -150,12 +150,7 @@ def test_edges_of_the_cut_stay_sharp_in_a_measured_load():
     """A force 2 % above the model bends the arm by 2 % more, at the edges of the cut too."""
     cuts = (INPUTS.time_s > 2.0) & (INPUTS.time_s < 7.0)
     inputs = replace(INPUTS, force_base_N=np.where(cuts[:, None], 500.0, 0.0) * np.ones(3), forces=stub())
-    measured = Force(
-        time_s=inputs.time_s,
-        row=np.arange(500),
-        segments=np.array([[0, 500]]),
-        force_N=1.02 * inputs.force_base_N,
-    )
+    measured = table(Force, inputs.time_s, force_N=1.02 * inputs.force_base_N)
     found = pair(inputs, force=measured).with_measured_load().inputs.load_base_N
     np.testing.assert_allclose(found[cuts], 510.0, atol=5.0 + 1e-9)
 
@@ -165,7 +160,7 @@ def test_what_the_sensor_alone_shows_does_not_bend_the_arm():
     inputs = replace(INPUTS, force_base_N=np.full((500, 3), 100.0), forces=stub())
     zero = Applied(library()["force_offset"], None, {"fx_N": 40.0, "fy_N": 0.0, "fz_N": 0.0})
     seen = simulate(inputs, [zero]).force_meas_base_N
-    measured = Force(time_s=inputs.time_s, row=np.arange(500), segments=np.array([[0, 500]]), force_N=seen)
+    measured = table(Force, inputs.time_s, force_N=seen)
     found = pair(inputs, force=measured).with_measured_load([zero]).inputs.load_base_N
     np.testing.assert_allclose(found, 100.0, atol=1e-9)
 
@@ -334,12 +329,7 @@ def test_without_a_robot_or_with_relative_angles_there_is_no_tip():
 
 
 def test_a_measured_force_is_the_load_turned_into_the_base():
-    force = Force(
-        time_s=FINE_S,
-        row=np.arange(len(FINE_S)),
-        segments=np.array([[0, len(FINE_S)]]),
-        force_N=np.tile([10.0, -20.0, 5.0], (len(FINE_S), 1)),
-    )
+    force = table(Force, FINE_S, force_N=np.tile([10.0, -20.0, 5.0], (len(FINE_S), 1)))
     turns = {"base": Rotation.identity(len(FINE_S))}
     turns["tcp"] = Rotation.from_quat(robot.forward(ROUNDED_RAD, cell(), 1)[1])
     push = np.array(force.force_N)
@@ -446,8 +436,7 @@ TIME_S = np.arange(0.0, 10.0, 0.02)
 
 
 def logged(**columns):
-    count = len(TIME_S)
-    return Controller(time_s=TIME_S, row=np.arange(count), segments=np.array([[0, count]]), **columns)
+    return controller(TIME_S, **columns)
 
 
 def test_places_come_first_the_ambient_last_and_gaps_are_filled():

@@ -35,7 +35,7 @@ from gcode2krl.gap.compare.slips import (
 )
 from gcode2krl.gap.posterior.set_up import first_slip
 from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.runs import Controller, Run, RunHead
+from gcode2krl.runs import Run, RunHead
 from tests.gap.constructed import controller, joints, motion, pair
 from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, prediction, refined, runs, side
 
@@ -52,9 +52,7 @@ def with_table(one, table, **columns):
 
 def with_joints(one, time_s, q_rad):
     """Return a pair whose run has nothing but commanded joints."""
-    table = Controller(
-        time_s=time_s, row=np.arange(len(q_rad)) + 2, segments=np.array([[0, len(q_rad)]]), q_cmd_rad=q_rad
-    )
+    table = controller(time_s, q_cmd_rad=q_rad)
     return replace(one, run=Run(one.run.name, one.run.folder, one.run.head, controller=table))
 
 

@@ -9,7 +9,7 @@ import pytest
 from gcode2krl.errors import Gcode2KrlError, RefusedError
 from gcode2krl.gap import diagnose, diagnose_log
 from gcode2krl.runs import Run, RunHead, load_run
-from gcode2krl.runs.measured import Controller
+from tests.gap.constructed import controller
 from tests.gap.synthetic import PROGRAM, applied, prediction, runs, write
 
 # Wrong inputs: each has an answer of its own
@@ -121,12 +121,7 @@ SHORT = "G21 G90 G17 G54\nG0 X0 Y0 Z20\nG1 X60 F3000\nG1 Y30\nM30\n"
 
 
 def run_of(**columns):
-    time_s = columns.pop("time_s", TIME_S)
-    rows = np.arange(len(time_s))
-    table = Controller(
-        time_s=time_s, row=rows, segments=np.array([[0, len(rows)]]), source="controller.csv", **columns
-    )
-    return Run("run-1", Path(), RunHead(), controller=table)
+    return Run("run-1", Path(), RunHead(), controller=controller(columns.pop("time_s", TIME_S), **columns))
 
 
 def refused(diagnosed, *given):
