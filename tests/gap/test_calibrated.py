@@ -31,7 +31,6 @@ from tests.gap.constructed import LINK, motion, noise, question, trace, wave
 
 # Probabilities: monotone in every test, clipped, refused where the table is of something else
 
-
 GOOD = Features(
     surprise=300.0,
     size_over_noise=1.0,
@@ -212,7 +211,6 @@ def test_declared_sets_are_as_wide_as_the_table_says_and_no_narrower_than_the_co
 
 
 # The tests of a cause as numbers: what goes in, how they are rounded, and their names in the JSON object
-
 
 COUNT, SIGMA = 500, 1e-4
 TIME_S = motion().time_s

@@ -27,7 +27,6 @@ from tests.gap.constructed import controller, joint_rates, joints, motion, noise
 
 # Clocks: known offsets come back, and what is no clock is not taken for one
 
-
 LONG = motion(40.0)
 STAMPS_S = np.arange(0.3, 36.0, 0.02)
 
@@ -128,7 +127,6 @@ def test_runs_on_another_time_law_keep_their_clocks():
 
 # How late a run is: along its motion, against known delays
 
-
 NOMINAL = trace(np.zeros((500, 6)), "path")
 RATE = joint_rates(NOMINAL.time_s)
 INSIDE = slice(10, -10)
@@ -207,7 +205,6 @@ def test_small_lateness_and_another_path_are_compared_at_the_same_time():
 
 
 # The run's own timing: samples of the plan get the times at which the run was there
-
 
 INPUTS = motion()
 PLAN_S = INPUTS.time_s

@@ -18,7 +18,6 @@ from tests.gap.synthetic import applied, prediction, runs, write
 
 # The command ``diagnose``
 
-
 SERVO = {"tracker": False, "force": False}
 
 
@@ -61,7 +60,6 @@ def test_from_log(tmp_path):
 
 
 # ``diagnose --html`` and ``--plot``: what is written, and one clear line where it cannot be
-
 
 FOUND = replace(GAP, where=Where(intervals=(STRETCH,)), evidence=evidence())
 

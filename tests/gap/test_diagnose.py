@@ -15,7 +15,6 @@ from tests.gap.synthetic import LIBRARY, PROGRAM, TRUE_STEP_S, applied, bent, pr
 
 # The whole diagnosis on runs made with the library's effects, noise and normal mismatch
 
-
 SERVO = {"tracker": False, "force": False}
 GEAR = {**SERVO, "load_encoders": True}
 FORCE = {"tracker": False, "controller": False}
@@ -282,7 +281,6 @@ def test_a_cause_that_shows_in_two_links_is_named_once(text, signals):
 
 # A diagnosis finds a step: in which run, when, where and how large
 
-
 BEGIN = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
 
 
@@ -321,7 +319,6 @@ def test_a_step_is_named_with_its_moment(text, target, at_s, size, value):
 
 
 # A force that bends the arm is there; one that the sensor alone shows is the sensor's, noise or error
-
 
 WANDER_N = 30.0
 

@@ -58,7 +58,6 @@ from tests.gap.answered import (
 
 # The pictures: what is drawn, from numbers that are known
 
-
 DRAWN = replace(GAP, evidence=evidence(), where=Where(intervals=(STRETCH,)))
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -243,7 +242,6 @@ def test_the_slider_has_time_line_size_and_the_same_points_as_the_path():
 
 
 # The page: one file that needs no network, with everything that the answer says
-
 
 WHERE = Where(intervals=(STRETCH, replace(STRETCH, share=0.1)))
 RICH = replace(

@@ -28,7 +28,6 @@ from tests.gap.constructed import LINK, motion, noise, question, stub, trace, wa
 
 # Whose an event is: the command's, the machine's or the instrument's, and what is left out
 
-
 STEP_S, SECONDS = 0.01, 20.0
 COUNT = round(SECONDS / STEP_S)
 TIME_S = STEP_S * np.arange(COUNT)
@@ -246,7 +245,6 @@ def test_a_following_error_in_step_with_the_jerk_is_a_gap_and_depends_on_it():
 
 # Bursts and outliers are told from what effects, jumps, vibration or louder cutting do
 
-
 BURST_ROWS = 1500
 BURST_S = 0.01 * np.arange(BURST_ROWS)
 WHOLE = np.array([[0, BURST_ROWS]], dtype=np.int64)
@@ -308,7 +306,6 @@ def test_where_the_model_jumps_nothing_is_left_out():
 
 # Pulses: hardly ever in noise of any kind, and found to the row where there is one
 
-
 PULSED_S = 15.0
 STATED = 0.01
 """Of runs with a pulse by chance: what the threshold's reason says, with room for its own chance."""
@@ -369,7 +366,6 @@ def test_a_step_is_none():
 
 # Hum of the mains goes, folded or not; a tone beside the mains, and that of a spindle, stays
 
-
 HUM_ROWS, HUM_STEP_S = 5000, 0.004
 HUM_S = HUM_STEP_S * np.arange(HUM_ROWS)
 
@@ -422,7 +418,6 @@ def test_what_went_is_told():
 
 
 # Change points: a jump is found to a sample beside trends and tones, and nothing where nothing jumps
-
 
 STEP = library()["step"]
 

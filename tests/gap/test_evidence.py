@@ -24,7 +24,6 @@ from tests.gap.constructed import HZ, LINK, cell, joint_rates, joints, motion, n
 
 # What the pictures are drawn from: the component, its size at the tip, and the input it depends on
 
-
 NOWHERE = replace(motion(), position_mm=np.zeros((500, 3)))
 
 
@@ -101,7 +100,6 @@ def test_at_the_tip_a_joints_cause_is_shown_along_what_the_joint_moves():
 
 # The input that a gap depends on, along a run, on a motion that is known
 
-
 FORCED_S = motion().time_s
 FORCED = replace(
     motion(),
@@ -172,7 +170,6 @@ def test_the_input_that_says_most_is_taken_and_one_that_is_not_there_is_passed_o
 
 
 # Residuals of a judged link: before and after its named causes, and of what the gap is made
-
 
 SIGMA = 1e-4
 TIME_S = motion().time_s

@@ -39,7 +39,6 @@ from tests.gap.constructed import (
 
 # What a selection has accepted: causes beside mismatch, what is left without one, where an effect acts
 
-
 SIGMA, COUNT = 1e-4, 400
 TIME_S = STEP_S * np.arange(COUNT)
 HALF = TIME_S[-1] / 2.0
@@ -83,7 +82,6 @@ def test_it_counts_values_and_times(made):
 
 
 # What the data could have shown: the smallest size by hand, and that such a size is found
-
 
 ROWS, NOISE_RAD = 500, 1e-4
 LEAST_RATIO = 0.08
@@ -164,7 +162,6 @@ def test_an_effect_of_several_numbers_has_no_smallest_one():
 
 # What a link's model says of the joints, for the links behind it: effects and mismatch, and no encoder
 
-
 ENCODER_RAD = 1e-5
 INPUTS = motion()
 EFFECT = wave(2.0)
@@ -227,7 +224,6 @@ def test_rows_that_were_left_out_have_a_model_too():
 
 # A tracker knows nothing of the cut: a tip that is louder there shakes, and that is no noise
 
-
 SIGMA_MM = 0.02
 CUT_SECONDS, CUT_STEP_S = 20.0, 0.01
 CUT_ROWS = round(CUT_SECONDS / CUT_STEP_S)
@@ -281,7 +277,6 @@ def test_what_is_loud_for_a_moment_alone_is_asked_about_and_no_gap_by_itself():
 
 
 # What is loud for moments: a gap where it follows the command, an instrument's where it does not
-
 
 MOMENTS, MOMENT_ROWS, APART = 1000, 12, 6.0
 

@@ -12,7 +12,6 @@ from tests.gap.constructed import split
 
 # Least squares in a box: against SciPy's solvers and the conditions of the least
 
-
 FITS = 300
 
 
@@ -157,7 +156,6 @@ def test_slopes_are_zero_inside_and_point_outwards_at_the_bounds():
 
 
 # Columns by runs and components: against the whole array
-
 
 GENERATOR = np.random.default_rng(1)
 

@@ -18,7 +18,6 @@ from tests.gap.constructed import motion, trace
 
 # Admissible inputs: loads of the gears with and without weight, what was logged, memory
 
-
 COUNT = 500
 PUSH_N = np.array([80.0, -30.0, 20.0])
 
@@ -73,7 +72,6 @@ def test_without_a_force_nothing_presses_and_without_a_thermometer_there_is_no_t
 
 
 # Another rounding of corners is a sum of columns, beside them and in time; moments alone are a gap
-
 
 SAME_SPEED = "G1 X80 F3000\nG1 Y60\nG1 X10 Y20\nG1 Y0\n"
 OTHER_SPEEDS = "G1 X80 F9000\nG1 Y60 F3000\nG1 X10 Y20 F9000\nG1 Y0 F3000\n"

@@ -20,7 +20,6 @@ from tests.gap.constructed import applied, joints, motion, wave
 
 # Signals between samples: against SciPy's Hermite cubics, NumPy's lines and a loop
 
-
 GENERATOR = np.random.default_rng(1)
 OWN_S = np.cumsum(GENERATOR.uniform(0.005, 0.02, 60))
 VALUES = GENERATOR.standard_normal((60, 3))

@@ -12,7 +12,6 @@ from tests.gap.constructed import STEP_S, applied, columns_nuisance, motion, noi
 
 # Where noise is learnt: what repeats is none, nor what effects explain, nor what is slow; bounds hold
 
-
 COUNT, SIGMA = 2000, 2e-4
 TIME_S = 0.02 * np.arange(COUNT)
 COLOURED = Noise(np.array([0.6, 0.0, 0.0]), SIGMA, SIGMA / 0.8)

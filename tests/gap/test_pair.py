@@ -45,7 +45,6 @@ from tests.gap.constructed import (
 
 # A run beside its prediction: stamps, rows, and what was measured in place of the model
 
-
 INPUTS = motion()
 SAME_PATH_RAD = 2e-5
 """0.03 mm at an arm's length: a log's last decimal."""
@@ -167,7 +166,6 @@ def test_what_the_sensor_alone_shows_does_not_bend_the_arm():
 
 # Plans are remembered by what they are made of; predictions are refined where their samples are coarse
 
-
 STEP_S = 0.004
 PROGRAM = "G21 G90 G17\nG54\nT1 M6\nS9000 M3\nG0 X0 Y0 Z30\nG1 X80 F6000\nG1 Y60\nG1 X10 Y20\nM30\n"
 
@@ -245,7 +243,6 @@ def test_without_motion_or_joints_there_is_nothing_to_refine(prediction):
 
 
 # Runs to pairs: with predictions, with logs alone, and the hours between them
-
 
 FINE_S = np.arange(0.0, 10.0, 0.004)
 ROUNDED_RAD = np.radians(np.round(np.degrees(joints(FINE_S)), 4))
@@ -430,7 +427,6 @@ def test_of_long_runs_the_last_fine_path_alone_is_kept(monkeypatch):
 
 
 # Logged temperatures at the samples of a model, and as what a gap depends on
-
 
 TIME_S = np.arange(0.0, 10.0, 0.02)
 

@@ -204,7 +204,6 @@ def test_findings_have_five_keys():
 
 # Named causes in a cell file: the next prediction has them, what stood there stays
 
-
 LIBRARY = library()
 BACKLASH = Applied(LIBRARY["backlash"], "A2", {"gap_deg": 0.0212345678})
 FRAME = Applied(

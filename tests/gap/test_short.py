@@ -153,7 +153,6 @@ def test_what_hardly_decays_is_brought_to_decay():
 
 # Innovations beside the dense covariance: variances, log determinant, and every row of a segment
 
-
 A = np.array([0.9, -0.3])
 SLOW = [(0.98, 1.5)]
 
@@ -195,7 +194,6 @@ def test_without_a_slow_part_it_is_the_autoregressive_filter():
 
 
 # Tones are taken off noise, and nothing is where there is no tone
-
 
 COUNT = 1500
 

@@ -14,7 +14,6 @@ from tests.gap.constructed import columns_nuisance, motion, noise, trace
 
 # The slow part of noise: found where it is, of its size, and never what a drift, a step or an effect is
 
-
 STEP_S = 0.05
 COUNT, RUNS = 300, 3
 TIME_S = STEP_S * np.arange(COUNT)
@@ -150,7 +149,6 @@ def test_no_columns_and_no_blocks():
 
 # Block means: of what rows, over which segments, and contrasts of repeats, by hand
 
-
 ROWS = 500
 """Rows of 0.02 s; blocks of 0.05 s hold two or three."""
 ROWS_S = motion().time_s
@@ -231,7 +229,6 @@ def test_contrasts_of_repeats_have_nothing_of_what_the_runs_share():
 
 
 # What noise is cleaned of: the same inputs as those of families, as columns of a component
-
 
 LONG_ROWS = 1000
 LONG_S = np.arange(0.0, 20.0, 0.02)

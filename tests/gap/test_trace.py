@@ -1,7 +1,6 @@
 """Traces: what an instrument would show, what is held out, and what is known while links are judged."""
 
 from dataclasses import FrozenInstanceError, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from gcode2krl import robot
 from gcode2krl.effects import Applied, library
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.gap.compare.links import MECHANICS, PATH, SERVO
-from gcode2krl.gap.compare.pair import Simulator
 from gcode2krl.gap.compare.trace import Context, Trace, folds_of
 from gcode2krl.gap.components import Signatures, strongest_hz
 from gcode2krl.gap.noise.nuisance import nuisance_of
@@ -21,7 +19,6 @@ from gcode2krl.gap.posterior.likelihood import Likelihood
 from tests.gap.constructed import Added, applied, joint_rates, joints, motion, noise, pair, stub, trace, wave
 
 # Traces: what an instrument would show, in its frame, on its clock, with effects at work
-
 
 LIBRARY = library()
 INPUTS = motion()
@@ -115,32 +112,17 @@ def test_late_commands_show_in_the_drives():
 
 # What is held out, and when nothing can be
 
-
 COUNT, STEP_S = 2000, 0.01
 
 
-def _part(number: int) -> Trace:
-    time_s = STEP_S * np.arange(COUNT)
-    return Trace(
-        link=SERVO,
-        run=f"run-{number}",
-        run_number=number,
-        simulator=Simulator(),
-        factor=1.0,
-        components=("A1",),
-        columns=(0,),
-        plus="q_act_rad",
-        inputs=SimpleNamespace(time_s=time_s),
-        time_s=time_s,
-        measured=np.zeros((COUNT, 1)),
-        segments=np.array([[0, COUNT]], dtype=np.int64),
-    )
+def _part(number):
+    return trace(np.zeros((COUNT, 1)), number=number, inputs=motion(COUNT * STEP_S, STEP_S))
 
 
 def test_whole_runs_are_held_out_by_turns():
     traces = [_part(0), _part(1), _part(2)]
     pairs = folds_of(traces, [np.ones(COUNT)] * 3)
-    assert [[trace.run for trace in held] for _, held in pairs] == [["run-0"], ["run-1"], ["run-2"]]
+    assert [[trace.run for trace in held] for _, held in pairs] == [["run-1"], ["run-2"], ["run-3"]]
     assert all(held[0] not in kept for kept, held in pairs)
 
 
@@ -150,7 +132,7 @@ def test_where_one_run_has_the_power_its_quarters_are_held_out_with_guards():
     assert len(pairs) == 4
     for kept, held in pairs:
         first, last = held[0].time_s[[0, -1]]
-        own = next(trace for trace in kept if trace.run == "run-0")
+        own = next(trace for trace in kept if trace.run_number == 0)
         away = np.minimum(np.abs(own.time_s - first), np.abs(own.time_s - last))
         assert away[(own.time_s < first) | (own.time_s > last)].min() > 1.0
         assert not np.any((own.time_s >= first) & (own.time_s <= last))
@@ -165,7 +147,6 @@ def test_what_happens_at_one_place_only_cannot_be_held_out():
 
 
 # Rows at a kink of the path: where a clock is off by less than a sample they may be on either side of it
-
 
 TURN_S, JUMP, SIGMA = 5.0, 0.2, 1e-6
 

@@ -14,7 +14,6 @@ from tests.gap.synthetic import PROGRAM, applied, prediction, runs, write
 
 # Wrong inputs: each has an answer of its own
 
-
 SERVO = {"tracker": False, "force": False}
 
 
@@ -114,7 +113,6 @@ def test_no_run_is_an_error():
 
 
 # Where nothing was looked at "no gap" would be wrong: the diagnosis stops and says what to record
-
 
 TIME_S = np.arange(0.0, 5.0, 0.012)
 SHORT = "G21 G90 G17 G54\nG0 X0 Y0 Z20\nG1 X60 F3000\nG1 Y30\nM30\n"
