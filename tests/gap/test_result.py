@@ -16,11 +16,14 @@ from gcode2krl.gap.answer.result import (
     CauseResult,
     DependsOnResult,
     EffectAt,
+    Expectation,
     Gap,
     GapSize,
     LinkResult,
+    NextRun,
     NotExamined,
     RivalResult,
+    Separates,
     Unexplained,
     UnknownAt,
     Where,
@@ -29,61 +32,9 @@ from gcode2krl.gap.answer.result import (
 )
 from gcode2krl.gap.posterior.cause_tests import Interval
 from gcode2krl.gap.posterior.judgement import NAMED
-from tests.gap.test_report import GAP
+from tests.gap.answered import GAP
 
 # The typed result: frozen, and which causes count as named
-
-
-def _cause(probability):
-    return result.CauseResult(
-        effect="backlash",
-        target="A2",
-        link="gear",
-        probability=probability,
-        parameters={},
-        shrink=None,
-        rms_after=None,
-    )
-
-
-def _gap(*probabilities):
-    return result.Gap(
-        verdict="explained",
-        gap=result.GapSize(signal="tcp", unit="mm"),
-        links=(),
-        where=result.Where(),
-        causes=tuple(_cause(probability) for probability in probabilities),
-        unexplained=result.Unexplained(rms=None, significant=False, structure="unknown"),
-        not_examined=(),
-    )
-
-
-def test_causes_are_named_from_one_half_on():
-    gap = _gap(0.9, NAMED, NAMED - 1e-9, 0.1)
-    assert [cause.probability for cause in gap.named_causes] == [0.9, NAMED]
-    assert [cause.is_named for cause in gap.causes] == [True, True, False, False]
-
-
-def test_results_are_frozen():
-    classes = [
-        each for each in vars(result).values() if is_dataclass(each) and each.__module__ == result.__name__
-    ]
-    assert {"Gap", "GapSize", "LinkResult", "CauseResult", "Where", "IntervalResult"} <= {
-        c.__name__ for c in classes
-    }
-    for cls in classes:
-        assert cls.__dataclass_params__.frozen, cls
-    gap = _gap(0.9)
-    with pytest.raises(FrozenInstanceError):
-        gap.verdict = "no_gap"
-
-
-def test_nothing_compared_is_none_and_not_zero():
-    size = result.GapSize(signal="tcp", unit="mm")
-    assert {getattr(size, entry.name) for entry in fields(size)[2:]} == {None, False, ()}
-
-
-# The JSON object: keys in the order of the contract, plain values, what is left out
 
 
 def _backlash(**more):
@@ -116,6 +67,33 @@ def _answer(**more):
         "not_examined": (NotExamined(link="force", needs="force.csv"),),
     }
     return Gap(**(given | more))
+
+
+def test_causes_are_named_from_one_half_on():
+    gap = _answer(causes=[replace(_backlash(), probability=p) for p in (0.9, NAMED, NAMED - 1e-9, 0.1)])
+    assert [cause.probability for cause in gap.named_causes] == [0.9, NAMED]
+    assert [cause.is_named for cause in gap.causes] == [True, True, False, False]
+
+
+def test_results_are_frozen():
+    classes = [
+        each for each in vars(result).values() if is_dataclass(each) and each.__module__ == result.__name__
+    ]
+    assert {"Gap", "GapSize", "LinkResult", "CauseResult", "Where", "IntervalResult"} <= {
+        c.__name__ for c in classes
+    }
+    for cls in classes:
+        assert cls.__dataclass_params__.frozen, cls
+    with pytest.raises(FrozenInstanceError):
+        _answer().verdict = "no_gap"
+
+
+def test_nothing_compared_is_none_and_not_zero():
+    size = result.GapSize(signal="tcp", unit="mm")
+    assert {getattr(size, entry.name) for entry in fields(size)[2:]} == {None, False, ()}
+
+
+# The JSON object: keys in the order of the contract, plain values, what is left out
 
 
 def test_the_keys_are_those_of_the_contract_in_their_order():
@@ -155,6 +133,21 @@ def test_a_moment_has_two_names_and_an_unknown_may_be_in_a_declared_set():
     assert {"run", "line", "frequency_hz", "direction", "course"} <= set(found)
     compared = plain(_backlash(indistinguishable_from=(UnknownAt("A2", "reversals"),)))
     assert compared["indistinguishable_from"] == [{"kind": "unknown", "at": "A2", "on": "reversals"}]
+
+
+def test_the_next_run_parts_pairs_and_says_what_follows_from_what():
+    run = NextRun(
+        program="dwell",
+        minutes=np.float64(32.0),
+        separates=(Separates(first="thermal", second="step", odds=31.2),),
+        expect=(Expectation(answer="step", shows="nothing"),),
+    )
+    assert _answer(next_run=run).as_dict()["next_run"] == {
+        "program": "dwell",
+        "minutes": 32.0,
+        "separates": [["thermal", "step", 31.2]],
+        "expect": [{"if": "step", "then": "nothing"}],
+    }
 
 
 def test_numbers_are_plain_and_what_is_not_finite_is_null():
