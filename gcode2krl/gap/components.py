@@ -271,7 +271,9 @@ def smooth_in_each(inputs: Sequence[Floats]) -> Functions:
 def smooth_sum(inputs: Sequence[Floats]) -> Functions:
     """Return functions of each of several inputs (n, c), whose sum a deviation may be."""
     parts = [smooth([each[:, i] for each in inputs]) for i in range(inputs[0].shape[1])]
-    used = [part for part in parts if part.width] or parts[:1]
+    used = [part for part in parts if part.width]
+    if not used:
+        return smooth([np.zeros(len(each)) for each in inputs])
     columns = tuple(_side_by_side(*(part.columns for part in used)))
     return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
 

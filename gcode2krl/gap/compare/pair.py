@@ -308,6 +308,8 @@ def from_base(vectors: Floats, frame: str, inputs: Inputs, times_s: Floats) -> F
 
 def force_jumps(inputs: Inputs) -> Bools:
     """Return at which samples (m,) the predicted force is about to jump."""
+    if not inputs.force_base_N.any():
+        return np.zeros(len(inputs), dtype=np.bool_)
     later_N = linear(inputs.time_s + _LIMITS.jump_s, inputs.time_s, inputs.force_base_N)
     largest_N = float(np.linalg.norm(inputs.force_base_N, axis=1).max(initial=0.0))
     jumps: Bools = np.linalg.norm(later_N - inputs.force_base_N, axis=1) > _LIMITS.jump_share * largest_N
