@@ -145,8 +145,8 @@ def _say(result: "Geometry", console: Console) -> None:
 
     count, outliers = len(result.row), int(result.is_outlier.sum())
     console.say(
-        f"{result.source}: {result.robot}, {count} points; {len(result.told_numbers)} small numbers of the arm"
-        f": {result.rms_before_mm:.3f} -> {result.rms_after_mm:.3f} mm rms at places left out of the fit"
+        f"{result.source}: {result.robot}, {count} points; {len(result.told_numbers)} small numbers of the "
+        f"arm: {result.rms_before_mm:.3f} -> {result.rms_after_mm:.3f} mm rms at places left out of the fit"
     )
     console.say(f"  noise   {_noise_words(result)}")
     said = f", {outliers} points left out" if outliers else ""

@@ -22,6 +22,8 @@ from gcode2krl.effects import Applied, Effect, Parameter
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.inputs import RINGS_HZ, SWINGS_HZ, Admissible
+from gcode2krl.gap.compare.interpolation import hats
+from gcode2krl.gap.compare.pair import from_base
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 
@@ -102,39 +104,23 @@ def blocks_of(effect: Effect, target: str | None) -> Iterator[Block]:
 
 
 def blocks_at(
-    effect: Effect, target: str | None, frequencies_hz: Sequence[float], looked_at: float
+    effect: Effect, target: str | None, values: Sequence[float], looked_at: float
 ) -> Iterator[Block]:
-    """Yield the blocks of an effect with a frequency, at these in place of its grid's.
+    """Yield the blocks of an effect that begins at a moment or has a frequency, at these values of it.
 
-    They were chosen out of ``looked_at`` independent ones: one for each 1/T of the range, T the duration of a
-    run (Scargle 1982).
+    They were chosen out of ``looked_at`` independent ones: of frequencies one for each 1/T of the range, T
+    the duration of a run (Scargle 1982).
     """
-    frequency = effect.frequency
-    if frequency is None:
-        return
-    seen = set()
-    for block in blocks_of(effect, target):
-        others = {name: value for name, value in block.shape.items() if name != frequency.name}
-        for value in frequencies_hz:
-            key = (value, *sorted(others.items()))
-            if key not in seen:
-                seen.add(key)
-                tried = max(1.0, looked_at / len(frequencies_hz))
-                yield Block(effect, target, others | {frequency.name: value}, tried)
-
-
-def blocks_from(
-    effect: Effect, target: str | None, moments_s: Sequence[float], looked_at: float
-) -> Iterator[Block]:
-    """Yield the blocks of an effect that begins at a moment, at these out of so many that were looked at."""
-    moment = effect.moment
-    if moment is None:
+    searched, seen = effect.moment or effect.frequency, []
+    if searched is None:
         return
     for block in blocks_of(effect, target):
-        for at_s in moments_s:
-            yield Block(
-                effect, target, {**block.shape, moment.name: at_s}, max(1.0, looked_at / len(moments_s))
-            )
+        others = {name: value for name, value in block.shape.items() if name != searched.name}
+        if others not in seen:
+            seen.append(others)
+            for value in values:
+                tried = max(1.0, looked_at / len(values))
+                yield Block(effect, target, others | {searched.name: value}, tried)
 
 
 def strongest_hz(
@@ -288,10 +274,7 @@ def smooth_sum(inputs: Sequence[Floats]) -> Functions:
     used = [part for part in parts if part.width]
     if not used:
         return smooth([np.zeros(len(each)) for each in inputs])
-    columns = tuple(
-        np.concatenate(parts_of_trace, axis=1)
-        for parts_of_trace in zip(*(part.columns for part in used), strict=True)
-    )
+    columns = tuple(_side_by_side(*(part.columns for part in used)))
     return Functions(columns, tuple(in_each(root, len(used)) for root in used[0].roots))
 
 
@@ -300,12 +283,11 @@ def _smooth(inputs: Sequence[Floats], groups: Sequence[Floats], count: int) -> F
     if not high - low > _VARIES * max(abs(low), abs(high)):
         return Functions(tuple(np.zeros((len(each), 0)) for each in inputs), (np.eye(0),))
     knots = np.linspace(low, high, _LIMITS.knots)
-    hats = [np.maximum(0.0, 1.0 - np.abs(each[:, None] - knots) / (knots[1] - knots[0])) for each in inputs]
     columns: list[Floats] = []
-    for hat, group in zip(hats, groups, strict=True):
-        wide = np.zeros((len(hat), count, len(knots)))
-        wide[np.arange(len(hat)), group] = hat
-        columns.append(wide.reshape(len(hat), -1))
+    for values, group in zip(inputs, groups, strict=True):
+        wide = np.zeros((len(values), count, len(knots)))
+        wide[np.arange(len(values)), group] = hats(values, knots)
+        columns.append(wide.reshape(len(values), -1))
     roots = [in_each(_root(length), count) for length in _LIMITS.lengths]
     return Functions(tuple(columns), tuple(roots))
 
@@ -453,8 +435,9 @@ class Grid:
         """Return units (k, n, 1) along vectors (n, 3) of each trace in ``$BASE``."""
         sigma = float(np.mean(self._sigma))
         return tuple(
-            sigma * inputs.as_stated(vector)[:, list(inputs.trace.columns)].T[:, :, None]
-            for inputs, vector in zip(self.inputs, vectors, strict=True)
+            sigma
+            * from_base(vector, trace.frame, trace.inputs, trace.time_s)[:, list(trace.columns)].T[:, :, None]
+            for trace, vector in zip(self.traces, vectors, strict=True)
         )
 
     def _own_joints(self) -> Iterator[Place]:
@@ -472,9 +455,9 @@ class Grid:
             if scale > 0.0:
                 yield Place(f"A{joint + 1}", Where.JOINT, tuple(each / scale for each in lifted), joint)
 
-    def families(self, on: Dependence | None = None) -> Iterator[Family]:
-        """Yield every family that is no step and no tone; those on one input where it is stated."""
-        for place in self.places:
+    def families(self, on: Dependence | None = None, at: str | None = None) -> Iterator[Family]:
+        """Yield every family that is no step and no tone; those on one input, at one place, where stated."""
+        for place in (each for each in self.places if at in (None, each.name)):
             for of, functions in self._functions(place):
                 if functions.width and on in (None, of):
                     yield Family(place, of, *place.lifted(functions), directions=place.width)
@@ -484,7 +467,7 @@ class Grid:
                 yield from self._of_the_signal(place)
             if place.width > 1 and on in (None, Dependence.ACCELERATION):
                 yield self._of_swings(place, RINGS_HZ if place.where is Where.TIP else SWINGS_HZ)
-        if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN):
+        if self.traces[0].link.tells_time and on in (None, *_OF_THE_PLAN) and at in (None, TIMING):
             yield from self._of_the_plan(self._timing)
 
     # Functions at a place
@@ -518,29 +501,25 @@ class Grid:
         return free(self._pose(turned=False))
 
     @cached_property
-    def _of_force(self) -> list[tuple[Dependence, Functions]]:
-        return list(self._functions_of_force())
-
-    @cached_property
     def _of_time(self) -> list[tuple[Dependence, Functions]]:
-        return list(self._functions_of_time())
-
-    def _functions_of_time(self) -> Iterator[tuple[Dependence, Functions]]:
         inputs, count = self.inputs, len(self.inputs)
-        yield Dependence.CONSTANT, free([np.ones((len(each.hours), 1)) for each in inputs])
-        yield Dependence.RUN_TIME, smooth_in_each([each.since_start_s for each in inputs])
-        if count > 1:
-            runs = [
-                np.repeat(np.eye(count)[i][None], len(each.hours), axis=0) for i, each in enumerate(inputs)
-            ]
-            yield Dependence.RUN_TO_RUN, free(runs)
+        since_s, ones = [each.since_start_s for each in inputs], np.eye(count)[:, None]
         grown = [np.stack([-np.expm1(-each.hours / tau) for tau in _WARMS_H], axis=1) for each in inputs]
-        yield Dependence.WALL_CLOCK, free(grown)
-        yield Dependence.RUN_START, smooth([each.since_start_s for each in inputs])
+        functions = [
+            (Dependence.CONSTANT, free([np.ones((len(each), 1)) for each in since_s])),
+            (Dependence.RUN_TIME, smooth_in_each(since_s)),
+            (Dependence.WALL_CLOCK, free(grown)),
+            (Dependence.RUN_START, smooth(since_s)),
+        ]
+        if count > 1:
+            runs = [np.repeat(run, len(each), axis=0) for run, each in zip(ones, since_s, strict=True)]
+            functions.insert(2, (Dependence.RUN_TO_RUN, free(runs)))
         if any(each.spindle.any() for each in inputs):
-            yield Dependence.SPINDLE_SPEED, free([each.spindle for each in inputs])
+            functions.append((Dependence.SPINDLE_SPEED, free([each.spindle for each in inputs])))
         if any(each.temperature_C.any() for each in inputs):
-            yield Dependence.TEMPERATURE, smooth_sum([each.temperature_C for each in inputs])
+            temperature_C = [each.temperature_C for each in inputs]
+            functions.append((Dependence.TEMPERATURE, smooth_sum(temperature_C)))
+        return functions
 
     def _of_motion(self, place: Place) -> Iterator[tuple[Dependence, Functions]]:
         inputs = self.inputs
@@ -557,8 +536,7 @@ class Grid:
         velocity = [each.velocity_mm_s for each in inputs]
         speed = [np.linalg.norm(each, axis=1, keepdims=True) for each in velocity]
         along = [v / np.maximum(s, 1.0) for v, s in zip(velocity, speed, strict=True)]
-        joined = [np.concatenate(each, axis=1) for each in zip(velocity, along, speed, strict=True)]
-        yield Dependence.VELOCITY, free(joined)
+        yield Dependence.VELOCITY, free(_side_by_side(velocity, along, speed))
         yield Dependence.ACCELERATION, free([each.acceleration_mm_s2 for each in inputs])
 
     def _of_joint(self, joint: int) -> Iterator[tuple[Dependence, Functions]]:
@@ -579,20 +557,21 @@ class Grid:
             single = odd([each.torque_Nm[:, joint] for each in inputs])
             # the weight of the links is part of the first; the force alone is what bends the arm
             loads = odd([each.load_torque_Nm[:, joint] for each in inputs])
-            joined = [np.concatenate(each, axis=1) for each in zip(single, loops, loads, strict=True)]
-            yield Dependence.OWN_TORQUE, free(joined)
+            yield Dependence.OWN_TORQUE, free(_side_by_side(single, loops, loads))
 
-    def _functions_of_force(self) -> Iterator[tuple[Dependence, Functions]]:
+    @cached_property
+    def _of_force(self) -> list[tuple[Dependence, Functions]]:
         inputs = self.inputs
         force = [each.force_N for each in inputs]
         size = [np.linalg.norm(each, axis=1, keepdims=True) for each in force]
         most = max(float(each.max()) for each in size)
         unit = [f / np.maximum(s, 1e-3 * most) for f, s in zip(force, size, strict=True)]
         bent = [f * s / most for f, s in zip(force, size, strict=True)]
-        columns = [np.concatenate(each, axis=1) for each in zip(force, bent, unit, size, strict=True)]
-        yield Dependence.FORCE, free(columns)
         place_ = polynomials([each.position_mm for each in inputs], 1)
-        yield Dependence.FORCE_BY_PLACE, free(products(force, place_))
+        return [
+            (Dependence.FORCE, free(_side_by_side(force, bent, unit, size))),
+            (Dependence.FORCE_BY_PLACE, free(products(force, place_))),
+        ]
 
     def _of_metres_cut(self, place: Place) -> Functions:
         """Return what grows with the metres cut: the force and, of the tip, a wear or a slip of its own.
@@ -602,10 +581,8 @@ class Grid:
         inputs = self.inputs
         force = [each.force_N for each in inputs]
         cut = polynomials([each.cut_m[:, None] for each in inputs], 2)
-        parts = [products(force, [each[:, 1:] for each in cut]), force]
-        if place.where is Where.TIP:
-            parts.append(cut)
-        return free([np.concatenate(each, axis=1) for each in zip(*parts, strict=True)])
+        grows = products(force, [each[:, 1:] for each in cut])
+        return free(_side_by_side(grows, force, *([cut] if place.where is Where.TIP else [])))
 
     def _pose(self, turned: bool) -> list[Floats]:
         """Return low polynomials of the position, with the axes of the tool where they matter."""
@@ -642,29 +619,27 @@ class Grid:
         """Yield what a controller makes of corners, speeds and stops by laws of its own."""
         inputs, at = self.inputs, list(self.traces[0].columns)
         sigma = float(np.mean(self._sigma))
-        late, _ = place.lifted(free([each.late_by_rounding for each in inputs]))
-        rounded = [np.moveaxis(each.roundings[:, :, at], 2, 0) for each in inputs]
+        late, _ = place.lifted(free([each.at(each.corners.late_by_rounding) for each in inputs]))
+        rounded = [np.moveaxis(each.at(each.corners.roundings)[:, :, at], 2, 0) for each in inputs]
         yield Family(place, Dependence.CORNERS, *_joined([late, _scaled(rounded, sigma)]))
-        yield Family(place, Dependence.VELOCITY, *place.lifted(free([each.late_by_ramps for each in inputs])))
+        ramps = free([each.at(each.corners.late_by_ramps) for each in inputs])
+        yield Family(place, Dependence.VELOCITY, *place.lifted(ramps))
         yield Family(place, Dependence.STOPS, *place.lifted(free(self._passed)))
 
     @property
     def _passed(self) -> list[Floats]:
         """(n, c) of each trace: 1 from each blended corner on, of one program the same in all runs."""
-        programs: dict[bytes, int] = {}
-        numbers: list[int] = []
-        widths: list[int] = []
-        for inputs in self.inputs:
-            targets = inputs.trace.inputs.targets
-            key = b"" if targets is None else targets.position_mm.tobytes()
-            numbers.append(programs.setdefault(key, len(programs)))
-            if len(programs) > len(widths):
-                widths.append(inputs.corners_passed.shape[1])
-        firsts = np.cumsum([0, *widths])
-        columns = [np.zeros((len(each.corners_passed), firsts[-1])) for each in self.inputs]
-        for number, wide, inputs in zip(numbers, columns, self.inputs, strict=True):
-            wide[:, firsts[number] : firsts[number + 1]] = inputs.corners_passed
-        return columns
+        programs = [
+            b"" if trace.inputs.targets is None else trace.inputs.targets.position_mm.tobytes()
+            for trace in self.traces
+        ]
+        passed = [inputs.corners.passed(inputs.nearest) for inputs in self.inputs]
+        widths = {program: columns.shape[1] for program, columns in zip(programs, passed, strict=True)}
+        firsts = dict(zip(widths, np.cumsum([0, *widths.values()]).tolist(), strict=False))
+        wide = [np.zeros((len(columns), sum(widths.values()))) for columns in passed]
+        for program, columns, whole in zip(programs, passed, wide, strict=True):
+            whole[:, firsts[program] : firsts[program] + widths[program]] = columns
+        return wide
 
     def _of_the_pose(self, place: Place) -> Iterator[Family]:
         """Yield what depends on the pose, and on force by it, in a way that the arm makes."""
@@ -685,6 +660,11 @@ class Grid:
             )
             lifted, _ = place.lifted(free(force))
             yield Family(place, Dependence.FORCE_BY_PLACE, *_joined([lifted, _scaled(bends, sigma)]))
+
+
+def _side_by_side(*parts: Sequence[Floats]) -> list[Floats]:
+    """Return the columns (n, c) of several parts side by side, of each trace."""
+    return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 
 
 def _is_alike(first: Sequence[Floats], second: Sequence[Floats]) -> bool:

@@ -1,8 +1,17 @@
-"""The diagnosis: runs beside their predictions, link by link, to one answer."""
+"""The diagnosis: runs beside their predictions, link by link, to one answer.
+
+**What bends the arm where the model of the force fails.** A force that is there bends it; an error of its
+sensor does not. With X what the measured force less the predicted one would do to the tip, and r what the tip
+does beside its prediction, both less normal mismatch, r = g·X + noise: g is near 1 where the force is there,
+and near 0 where it is the sensor's. What is noise of the sensor in X makes g smaller (errors in variables,
+Fuller 1987).
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from gcode2krl.cell import Cell
 from gcode2krl.effects import Effect, library
@@ -13,13 +22,16 @@ from gcode2krl.gap.answer.causes import late_by, with_geometry, with_lateness
 from gcode2krl.gap.answer.result import Gap
 from gcode2krl.gap.compare.clocks import on_own_timing, with_controller_clocks
 from gcode2krl.gap.compare.events import rough_spans, sorted_out, without_hum
-from gcode2krl.gap.compare.links import MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING
-from gcode2krl.gap.compare.pair import log_pairs, pairs_of
+from gcode2krl.gap.compare.links import FORCE, MECHANICS, PART, PATH, SERVO, SIGNALS, TIMING
+from gcode2krl.gap.compare.pair import Pair, log_pairs, pairs_of
 from gcode2krl.gap.compare.trace import Context, Link, Span, Trace, evenly_spread, is_lost, split
-from gcode2krl.gap.posterior.bending import bends_of, bent_by, shown_at_tip
-from gcode2krl.gap.posterior.examination import question_of
+from gcode2krl.gap.components import Signatures
+from gcode2krl.gap.noise.nuisance import Nuisance, nuisance_for
+from gcode2krl.gap.noise.source import noise_of
+from gcode2krl.gap.posterior.examination import question_of, unexplained_by_mismatch
 from gcode2krl.gap.posterior.geometry import geometry_of_arm, judge_surface
-from gcode2krl.gap.posterior.judgement import judge
+from gcode2krl.gap.posterior.judgement import Judgement, judge
+from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.posterior.set_up import examine_set_up
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.prediction import Prediction
@@ -142,7 +154,7 @@ def _answered(context: Context, begin: Begin) -> Gap:
         if planned.has_actual_joints_alone
     ]
     context = _with_data(on_time)
-    rough = _rough(context)
+    rough = {link: rough_spans(link.traces(context.pairs, link.base(context))) for link in SIGNALS}
     shares: dict[str, float] = {}
     links = begin("links")
     for count, link in enumerate(SIGNALS):
@@ -227,23 +239,13 @@ def _of_actual_joints(planned: Context, on_time: Context) -> list[Issue]:
     return [Issue("note", "joints-actual-alone", 0, words), *late]
 
 
-def _rough(context: Context) -> dict[str, dict[str, list[Span]]]:
-    """Return of each table and run the times at which it is rough, of links that are measured directly."""
-    rough: dict[str, dict[str, list[Span]]] = {}
-    for link in SIGNALS:
-        traces = link.traces(context.pairs, link.base(context))
-        for run, spans in rough_spans(traces).items():
-            rough.setdefault(link.table, {}).setdefault(run, []).extend(spans)
-    return rough
-
-
-def _elsewhere(rough: Mapping[str, Mapping[str, Sequence[Span]]], link: Link) -> dict[str, list[Span]]:
+def _elsewhere(rough: Mapping[Link, Mapping[str, Sequence[Span]]], link: Link) -> dict[str, list[Span]]:
     """Return of each run the times at which tables other than a link's own are rough."""
-    others: dict[str, list[Span]] = {}
-    for table, runs in rough.items():
-        for run, spans in runs.items() if table != link.table else ():
-            others.setdefault(run, []).extend(spans)
-    return others
+    spans: dict[str, list[Span]] = {}
+    for other in (each for each in rough if each.table != link.table):
+        for run in rough[other]:
+            spans.setdefault(run, []).extend(rough[other][run])
+    return spans
 
 
 def _with_data(context: Context) -> Context:
@@ -258,3 +260,107 @@ def _with_data(context: Context) -> Context:
     if any(link.tells_time for link in links):
         links.append(TIMING)
     return replace(context, examined=frozenset(link.name for link in links), joints=joints)
+
+
+# What bends the arm where the model of the force fails
+
+_SURE = 3.0
+"""Standard deviations."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Runs whose arm the measured force bends, and what the tip says to it."""
+
+    pairs: tuple[Pair, ...]
+    gain: float
+    """How much of what that would do the tip does."""
+    nats: float
+    """The evidence of it."""
+    sigma: float
+    """Of the gain."""
+
+    @property
+    def is_seen(self) -> bool:
+        """Tell whether the tip does what the force says, and not by chance."""
+        return (
+            self.nats >= THRESHOLDS.posterior.bend_nats
+            and abs(self.gain - 1.0) <= THRESHOLDS.posterior.bend_off
+        )
+
+    @property
+    def is_denied(self) -> bool:
+        """Tell whether the tip surely does not do what the force says: that is the sensor's."""
+        return self.gain + _SURE * self.sigma < 1.0 - THRESHOLDS.posterior.bend_off
+
+
+def bends_of(judged: Judgement, context: Context) -> list[Bend]:
+    """Return the arm bent by the measured force, in the cut alone and in air too, where its model may fail.
+
+    Of the force link alone, where it is lost, or what may be noise of its sensor is slow or loud; else none.
+    """
+    if judged.link is not FORCE or not (is_lost(judged) or _is_doubtful(judged)):
+        return []
+    base = FORCE.base(context)
+    seen, bending = (*base, *judged.applied), (*base, *context.learned)
+    bent = [
+        tuple(pair.with_measured_load(seen, bending, in_air=in_air) for pair in context.pairs)
+        for in_air in (False, True)
+    ]
+    of_tip = MECHANICS.base(context)
+    traces = evenly_spread(MECHANICS.traces(context.pairs, of_tip))
+    if not traces or traces[0].still:
+        return [Bend(each, 0.0, 0.0, np.inf) for each in bent]
+    question = replace(question_of(MECHANICS, traces, context), blocks=())
+    nuisance = nuisance_for(traces, question, Signatures())
+    bends = []
+    for pairs in bent:
+        models = {trace.run_number: trace.inputs for trace in MECHANICS.traces(pairs)}
+        at_same_rows = [replace(trace, inputs=models[trace.run_number]) for trace in traces]
+        bends.append(Bend(pairs, *_followed(traces, at_same_rows, nuisance)))
+    return bends
+
+
+def shown_at_tip(traces: Sequence[Trace], judged: Judgement, bends: Sequence[Bend]) -> list[Trace] | None:
+    """Return the traces of a force whose slow or loud noise bends the arm, and so is no noise; else None."""
+    if not (bends and _is_doubtful(judged) and any(bend.is_seen for bend in bends)):
+        return None
+    return [replace(trace, is_shown_at_tip=True) for trace in traces]
+
+
+def bent_by(bends: Sequence[Bend], context: Context) -> Context:
+    """Return the context whose arm the measured force bends, in air too where the tip shows that better.
+
+    Where the tip does not tell, in the cut alone; where it denies the force, the predicted one goes on.
+    """
+    seen = [bend for bend in bends if bend.is_seen]
+    if not seen and (not bends or bends[0].is_denied):
+        return context
+    return context.with_pairs(max(seen or bends[:1], key=lambda bend: bend.nats).pairs)
+
+
+def _is_doubtful(judged: Judgement) -> bool:
+    """Tell whether the noise has a slow part, or loud rows that its sensor may have had."""
+    return judged.size.is_loud or any(noise.slow for noise in judged.examination.noise)
+
+
+def _followed(
+    traces: Sequence[Trace], bent: Sequence[Trace], nuisance: Sequence[Sequence[Nuisance]]
+) -> tuple[float, float, float]:
+    """Return the gain g of r = g·X + noise, its evidence in nats, and its standard deviation.
+
+    ``traces`` are tips beside the predicted load, ``bent`` the same beside the measured one. g by least
+    squares, the evidence ½·(|r|² - |r - g·X|²), both over how much more than noise is left.
+    """
+    ways = [there.nominal - trace.nominal for trace, there in zip(traces, bent, strict=True)]
+    if not any(way.any() for way in ways):
+        return 0.0, 0.0, np.inf
+    columns = [np.ascontiguousarray(way.T)[:, :, None] for way in ways]
+    likelihood = Likelihood(traces, nuisance, noise_of(traces, columns, nuisance))
+    residuals = [trace.residual for trace in traces]
+    r, x = (likelihood.whiten(unexplained_by_mismatch(likelihood, each)) for each in (residuals, ways))
+    power = max(float(x @ x), 1e-30)
+    gain = float(r @ x) / power
+    unexplained = float(np.sum((r - gain * x) ** 2))
+    inflation = max(1.0, unexplained / len(r))
+    return gain, 0.5 * (float(r @ r) - unexplained) / inflation, float(np.sqrt(inflation / power))

@@ -193,11 +193,16 @@ def noise(count: int, seed: int, sigma: float = 1.0, width: int = 1) -> np.ndarr
     return sigma * np.random.default_rng(seed).standard_normal((count, width))
 
 
-def controller(time_s: np.ndarray, **columns: np.ndarray) -> Controller:
-    """Return a controller's table without gaps."""
+def table(kind: type, time_s: np.ndarray, **columns: np.ndarray):
+    """Return a table of a run without gaps."""
     count = len(time_s)
     rows = {"time_s": time_s, "row": np.arange(count) + 2, "segments": np.array([[0, count]])}
-    return Controller(**rows, source="controller.csv", **columns)
+    return kind(**rows, source=f"{kind.__name__.lower()}.csv", **columns)
+
+
+def controller(time_s: np.ndarray, **columns: np.ndarray) -> Controller:
+    """Return a controller's table without gaps."""
+    return table(Controller, time_s, **columns)
 
 
 def pair(inputs: Inputs | None = None, head: RunHead | None = None, number: int = 0, **tables) -> Pair:

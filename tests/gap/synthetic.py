@@ -12,7 +12,7 @@ from gcode2krl.cell import resolve_cell
 from gcode2krl.compliance import deflect
 from gcode2krl.effects import Applied, inputs_of, library, parse, simulate
 from gcode2krl.effects.chain import Inputs
-from gcode2krl.gap.compare.pair import refined_prediction
+from gcode2krl.gap.compare.pair import Pair, refined_prediction
 from gcode2krl.gcode import read_stream
 from gcode2krl.prediction import Prediction
 from gcode2krl.runs import Controller, Force, Run, RunHead, Tracker
@@ -144,6 +144,17 @@ def runs(
         )
         for number in range(count)
     ]
+
+
+@functools.cache
+def side(
+    *texts: str, program: str = PROGRAM, cuts: bool = True, normal: bool = False, **signals: bool
+) -> Pair:
+    """Return a run with some effects beside the nominal prediction, without a table of forces by default."""
+    base = prediction(program, TRUE_STEP_S)
+    base = base if cuts else replace(base, forces=None, deflection=None)
+    (run,) = runs(applied(*texts), 1, 3, base=base, normal=normal, **({"force": False} | signals))
+    return Pair(run=run, number=0, inputs=inputs_of(prediction(dt_s=TRUE_STEP_S)))
 
 
 def _run(

@@ -36,14 +36,7 @@ def test_a_lag_of_one_drive_is_named_with_its_size():
     rate = np.gradient(motion(10.0, 0.012).q_cmd_rad[:, 2], 0.012)
     before = np.degrees(np.sqrt(np.mean((0.012 * rate) ** 2) + 6.0 * SIGMA_RAD**2))
     assert gap.gap.rms_before == pytest.approx(before, rel=0.03)
-    assert {each.link for each in gap.not_examined} == {
-        "timing",
-        "path",
-        "gear",
-        "force",
-        "mechanics",
-        "part",
-    }
+    assert " ".join(each.link for each in gap.not_examined) == "timing path gear force mechanics part"
 
 
 def test_drives_that_follow_are_no_gap():

@@ -1,4 +1,4 @@
-"""Whole cases of the plant in which nearly all that happens is in one stretch: flagged, and when it was."""
+"""Whole cases of the plant: what happens in one stretch with its moment, and several small errors at once."""
 
 import sys
 from importlib import import_module
@@ -34,3 +34,20 @@ def test_what_happens_in_one_stretch_is_told_with_its_moment(seed, kind, effect,
     assert answer["verdict"] != "no_gap"
     assert score.moment_hit(label["effects"], answer) in (True, None)
     assert list(score.told_moments(answer))
+
+
+def test_a_base_frame_beside_two_wrong_masterings_has_its_name(predictions, tmp_path):
+    """The model with what is named is as good as with the truth."""
+    case = cases.Case(14007, "many", None)
+    record = cases.run_case(case, tmp_path, cases.How(oracle=False), predictions)
+    assert record["error"] is None, record["error"]
+    assert {effect for effect, _ in map(score.truth_of, record["label"]["effects"])} == {
+        "base_frame",
+        "mastering",
+    }
+    judged = score.judge(record)
+    assert ("base_frame", None) in judged.named
+    assert not judged.is_wrongly_named
+    before, left, true = record["rests"]["MECHANICS"]
+    assert before > 4.0 * true
+    assert left < 1.1 * true

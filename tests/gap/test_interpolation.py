@@ -1,12 +1,24 @@
-"""Signals between samples: against SciPy's Hermite cubics, NumPy's lines and a loop."""
+"""Signals between samples, their last decimals and bands: against SciPy, NumPy and loops."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from gcode2krl.effects import simulate
-from gcode2krl.gap.compare.interpolation import LastPath, cubic, interpolate, linear, nearest_rows, values_of
+from gcode2krl.gap.compare.interpolation import (
+    Bands,
+    LastPath,
+    cubic,
+    interpolate,
+    linear,
+    nearest_rows,
+    resolution,
+    step_of,
+    values_of,
+)
 from tests.gap.constructed import applied, joints, motion, wave
+
+# Signals between samples: against SciPy's Hermite cubics, NumPy's lines and a loop
 
 GENERATOR = np.random.default_rng(1)
 OWN_S = np.cumsum(GENERATOR.uniform(0.005, 0.02, 60))
@@ -79,3 +91,40 @@ def test_measured_joints_stand_for_those_of_the_model():
     signals = simulate(replace(inputs, q_act_rad=measured))
     assert values_of(signals, "q_act_rad") is measured
     assert values_of(signals, "q_cmd_rad") is inputs.q_cmd_rad
+
+
+# The power in a band of a spectrum is that of sums over values at any times, wave by wave
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 40, 101])
+@pytest.mark.parametrize("first_hz", [0.0, 49.7])
+def test_sums_are_those_of_each_wave(count, first_hz):
+    generator = np.random.default_rng(1)
+    time_s = np.sort(generator.uniform(0.0, 20.0, 300))
+    values = generator.normal(size=(300, 3))
+    bands = Bands(time_s, 0.013, count)
+    waves = np.exp(-2j * np.pi * bands.hz(first_hz)[:, None] * time_s)
+    assert bands.power(first_hz, values) == pytest.approx(np.abs(waves @ values) ** 2, rel=1e-9)
+
+
+# The rms of rounding, told from the values themselves
+
+
+@pytest.mark.parametrize("step", [0.5, 0.01, 1e-5])
+def test_rounding_has_the_rms_of_a_uniform_draw(step):
+    exact = np.random.default_rng(8).uniform(-200.0 * step, 200.0 * step, 20_000)
+    rounded = np.round(exact / step) * step
+    assert resolution(rounded) == pytest.approx(step / np.sqrt(12.0), rel=1e-6)
+    assert resolution(rounded) == pytest.approx(float(np.std(rounded - exact)), rel=0.02)
+
+
+def test_a_constant_has_no_last_decimal():
+    assert resolution(np.full(50, 3.0)) == 0.0
+
+
+def test_few_values_are_on_a_ladder_or_on_none():
+    values = np.random.default_rng(0).uniform(-500.0, 500.0, 12)
+    assert step_of(20.0 * np.round(values / 20.0)) == pytest.approx(20.0)
+    assert step_of(np.array([0.37, 20.37, 0.37])) == pytest.approx(20.0)
+    assert step_of(np.round(values, 2)) == pytest.approx(0.01)
+    assert step_of(values) < 1e-6

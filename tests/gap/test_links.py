@@ -21,7 +21,7 @@ from gcode2krl.gap.compare.links import (
 )
 from gcode2krl.gap.compare.trace import Link, is_lost
 from gcode2krl.runs import Force, RunHead, Tracker
-from tests.gap.constructed import controller, joints, motion, pair, stub
+from tests.gap.constructed import controller, joints, motion, pair, stub, table
 
 INPUTS = motion()
 STAMPS_S = np.arange(0.1, 9.5, 0.012)
@@ -34,11 +34,6 @@ FORCE = ForceLink()
 def log(**more):
     columns = {"q_cmd_rad": OWN, "q_act_rad": OWN + LAG, "q_load_rad": OWN + LAG + TWIST} | more
     return controller(STAMPS_S, **columns)
-
-
-def instrument(kind, **columns):
-    count = len(STAMPS_S)
-    return kind(time_s=STAMPS_S, row=np.arange(count), segments=np.array([[0, count]]), **columns)
 
 
 def only(link, run, **more):
@@ -60,17 +55,17 @@ def test_the_joints_are_compared_side_by_side():
 def test_force_and_tip_are_compared_with_the_model():
     tip = GENERATOR.standard_normal((len(STAMPS_S), 3))
     push = GENERATOR.standard_normal((len(STAMPS_S), 3))
-    run = pair(tracker=instrument(Tracker, position_mm=tip), force=instrument(Force, force_N=push))
+    run = pair(tracker=table(Tracker, STAMPS_S, position_mm=tip), force=table(Force, STAMPS_S, force_N=push))
     np.testing.assert_array_equal(only(MECHANICS, run).measured, tip)
     np.testing.assert_array_equal(only(FORCE, run).measured, push)
-    assert (only(FORCE, run).unit, only(MECHANICS, run).unit) == ("N", "mm")
+    assert (only(FORCE, run).link.unit, only(MECHANICS, run).link.unit) == ("N", "mm")
 
 
 def test_the_tip_is_expected_where_the_measured_joints_put_it():
     """An error upstream is not blamed twice: a lag that the drives show is in the model of the tip."""
     slow = 2e-3 * np.sin(STAMPS_S)[:, None] * np.ones(6)
     log_ = controller(STAMPS_S, q_cmd_rad=OWN, q_act_rad=OWN + slow)
-    tip = instrument(Tracker, position_mm=np.zeros((len(STAMPS_S), 3)))
+    tip = table(Tracker, STAMPS_S, position_mm=np.zeros((len(STAMPS_S), 3)))
     alone, with_log = pair(tracker=tip), pair(tracker=tip, controller=log_)
     moved = only(MECHANICS, with_log).nominal - only(MECHANICS, alone).nominal
     jacobian = INPUTS.jacobian[np.searchsorted(INPUTS.time_s, STAMPS_S)][:, :3]
@@ -126,7 +121,10 @@ def test_a_correction_of_each_cycle_adds_up_and_a_missing_answer_holds():
 )
 def test_what_cannot_be_compared_is_no_trace(link, changes):
     zeros = np.zeros((len(STAMPS_S), 3))
-    tables = {"tracker": instrument(Tracker, position_mm=zeros), "force": instrument(Force, force_N=zeros)}
+    tables = {
+        "tracker": table(Tracker, STAMPS_S, position_mm=zeros),
+        "force": table(Force, STAMPS_S, force_N=zeros),
+    }
     run = pair(controller=log(), **tables)
     assert len(link.traces([run])) == 1
     changed = replace(run, run=replace(run.run, head=changes.pop("head", run.run.head)), **changes)
@@ -158,7 +156,7 @@ def test_jumps_of_the_predicted_force_are_left_out():
     away = np.minimum(np.abs(STAMPS_S - 3.0), np.abs(STAMPS_S - 6.0))
     assert near[away < 0.01].all()
     assert not near[away > 0.05].any()
-    run = pair(inputs, force=instrument(Force, force_N=np.zeros((len(STAMPS_S), 3))))
+    run = pair(inputs, force=table(Force, STAMPS_S, force_N=np.zeros((len(STAMPS_S), 3))))
     assert len(only(FORCE, run).segments) == 3
     assert not at_edges(INPUTS, STAMPS_S).any()  # no force, no jump
 

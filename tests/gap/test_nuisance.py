@@ -68,8 +68,8 @@ def test_a_force_zero_is_along_the_sensors_axes_whatever_the_frame(force):
     for axis in range(3):
         along = flange.apply(np.eye(3)[axis])
         np.testing.assert_allclose(columns[:, :, axis].T, along * 3.0 / ROOT3, atol=1e-12)
-    for frame in ("in_sensor_frame", "in_tool_frame"):
-        fixed = nuisance(replace(force, **{frame: True}), {})["force zero"].columns
+    for frame in ("sensor", "tcp"):
+        fixed = nuisance(replace(force, frame=frame), {})["force zero"].columns
         covariance = np.einsum("inc,jnc->nij", fixed, fixed)
         np.testing.assert_allclose(covariance, np.tile(3.0 * np.eye(3), (500, 1, 1)), atol=1e-12)
 

@@ -10,7 +10,7 @@ from gcode2krl.gap.posterior.examination import PlaceTimes
 from gcode2krl.gap.posterior.likelihood import refit
 from gcode2krl.gap.posterior.selection import replanned
 from tests.gap.constructed import applied, likelihood
-from tests.gap.test_place_times import SLOWER, run
+from tests.gap.test_examination import SLOWER, run
 
 SIGMA = 1e-4
 

@@ -48,7 +48,12 @@ def apart(program, found, rival):
     """The squared distance of what was found and a rival, fitted to the same run, in a program."""
     second = refit(found.likelihood, (rival,)).applied[0]
     bench = Bench(found, TRIALS[program].inputs, Mismatch())
-    return bench.apart(found.applied[:1], (second,), information_of(found, 0, (second,)))
+    return between(bench, found.applied[:1], (second,), information_of(found, 0, (second,)))
+
+
+def between(bench, first, second, information=None):
+    """What sets two answers apart in a program."""
+    return bench.between(bench.foretold(first), bench.foretold(second, information))
 
 
 def test_an_angle_of_axis_1_is_a_turn_of_the_base_wherever_the_arm_goes():
@@ -78,10 +83,10 @@ def test_warming_up_is_told_from_a_step_by_waiting():
     step, warming = found.applied[0], at("thermal", mm_per_h=0.3, time_constant_h=1.0, **ALONG_X)
     for name, parted in (("dwell", True), ("sync", False)):
         bench = Bench(found, replace(TRIALS[name].inputs, hours=0.51), Mismatch())
-        distance2 = bench.apart((warming,), (step,), information_of(found, 0, (step,))).distance2
+        distance2 = between(bench, (warming,), (step,), information_of(found, 0, (step,))).distance2
         assert distance2 > MANY if parted else distance2 < FEW
     dwell = Bench(found, TRIALS["dwell"].inputs, Mismatch())
-    shown = dwell.apart((warming,), ())
+    shown = between(dwell, (warming,), ())
     hours = TRIALS["dwell"].inputs.time_s[-1] / 3600.0
     grown = 0.3 * (1.0 - np.exp(-hours))
     assert shown.component == "x"
@@ -94,14 +99,14 @@ def test_warming_up_is_told_from_a_step_by_waiting():
 def test_play_of_one_joint_is_told_from_that_of_another(program):
     found = measured("backlash", "A1", (("gap_deg", 0.02),))
     bench = Bench(found, TRIALS[program].inputs, Mismatch())
-    assert bench.apart(found.applied[:1], (at("backlash", "A4", gap_deg=0.02),)).distance2 > MANY
+    assert between(bench, found.applied[:1], (at("backlash", "A4", gap_deg=0.02),)).distance2 > MANY
 
 
 def test_what_is_the_same_is_not_apart_and_what_grows_is_farther():
     found = measured("backlash", "A1", (("gap_deg", 0.02),))
     bench = Bench(found, TRIALS["single-joint"].inputs, Mismatch())
-    assert bench.apart(found.applied[:1], found.applied[:1]).distance2 < 1e-6
-    small, large = (bench.apart((at("backlash", "A2", gap_deg=gap),), ()).distance2 for gap in (0.005, 0.01))
+    assert between(bench, found.applied[:1], found.applied[:1]).distance2 < 1e-6
+    small, large = (between(bench, (at("backlash", "A2", gap_deg=g),), ()).distance2 for g in (0.005, 0.01))
     assert large > 2.0 * small > 0.0
 
 
@@ -109,8 +114,8 @@ def test_what_the_runs_say_binds_the_rival():
     found = measured("tool_frame", None, (("x_mm", 0.3),))
     bench = Bench(found, TRIALS["orientation"].inputs, Mismatch())
     rival = refit(found.likelihood, (at("mastering", "A6", offset_deg=0.01),)).applied[0]
-    free = bench.apart(found.applied[:1], (rival,)).distance2
-    bound = bench.apart(found.applied[:1], (rival,), information_of(found, 0, (rival,))).distance2
+    free = between(bench, found.applied[:1], (rival,)).distance2
+    bound = between(bench, found.applied[:1], (rival,), information_of(found, 0, (rival,))).distance2
     assert bound >= free - 1e-6
 
 

@@ -15,7 +15,7 @@ from gcode2krl.gap.components import Signatures
 from gcode2krl.gap.noise.nuisance import nuisance_of
 from gcode2krl.gap.posterior.examination import question_of
 from gcode2krl.runs import Run, RunHead, Tracker
-from tests.gap.constructed import LINK, cell, controller, joints, motion, noise, trace
+from tests.gap.constructed import LINK, cell, controller, joints, motion, noise, table, trace
 
 LIBRARY = library()
 
@@ -74,16 +74,11 @@ def logged(number, gap_deg, encoders):
     tip, _ = robot.forward(true, cell(), 1)
     load = true + noise(500, 10 + number, 3e-6, 6)
     load[:, encoders:] = np.nan
-    table = controller(time_s, q_cmd_rad=q, q_act_rad=q + noise(500, 20 + number, 3e-6, 6))
-    tracker = Tracker(
-        time_s=time_s,
-        row=np.arange(500),
-        segments=np.array([[0, 500]]),
-        position_mm=tip + noise(500, 30 + number, 0.01, 3),
-    )
+    log = controller(time_s, q_cmd_rad=q, q_act_rad=q + noise(500, 20 + number, 3e-6, 6))
+    tracker = table(Tracker, time_s, position_mm=tip + noise(500, 30 + number, 0.01, 3))
     if encoders:
-        table = replace(table, q_load_rad=load)
-    return Run(f"run-{number}", Path(f"run-{number}"), RunHead(), table, tracker)
+        log = replace(log, q_load_rad=load)
+    return Run(f"run-{number}", Path(f"run-{number}"), RunHead(), log, tracker)
 
 
 def played(values, half_width):

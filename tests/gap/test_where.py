@@ -126,7 +126,7 @@ def test_of_an_unexplained_gap_at_the_tip_the_joint_that_moves_it_that_way_has_m
 def test_the_direction_is_the_rms_of_each_axis():
     residual = np.column_stack([bump(2.0, 4.0, 3.0), 0.0 * TIME_S, bump(2.0, 4.0, -4.0)])
     assert found(residual, SLOW, "mechanics").direction_base == pytest.approx((0.6, 0.0, 0.8), abs=1e-6)
-    assert found(residual, SLOW, "force", in_sensor_frame=True).direction_base is None
+    assert found(residual, SLOW, "force", frame="sensor").direction_base is None
     assert found(bump(2.0, 4.0)).direction_base is None  # joints have none
 
 

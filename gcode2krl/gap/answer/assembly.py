@@ -39,7 +39,7 @@ from gcode2krl.gap.compare.slips import Slip
 from gcode2krl.gap.compare.trace import Context, Link
 from gcode2krl.gap.posterior.examination import observable
 from gcode2krl.gap.posterior.families import Evidence
-from gcode2krl.gap.posterior.judgement import Cause, Judged, Judgement
+from gcode2krl.gap.posterior.judgement import Judged, Judgement
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 
@@ -74,7 +74,15 @@ def answer(context: Context, slips: Sequence[Slip], issues: Sequence[Issue]) -> 
             *(slip.applied for slip in slips if not slip.final),
             *(applied for judgement in _gapped(judgements) for applied in judgement.applied),
         ),
-        issues=(*issues, *_issues_of_runs(context.pairs), *issues_of(signals)),
+        issues=(
+            *issues,
+            *(
+                replace(issue, message=f"{pair.name}: {issue.message}")
+                for pair in context.pairs
+                for issue in pair.run.issues
+            ),
+            *issues_of(signals),
+        ),
         runs=tuple(pair.name for pair in context.pairs),
         notes=tuple(_notes(context.pairs, signals)),
         evidence=None
@@ -140,7 +148,11 @@ def _size(
 ) -> GapSize:
     """Return the size of the largest gap: that of a link or, where none has one, that of the first slip."""
     if largest is None or (slips and largest.verdict == "no_gap"):
-        return _size_of_slip(slips[0]) if slips else GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
+        if not slips:
+            return GapSize(signal=MECHANICS.signal, unit=MECHANICS.unit)
+        slip = slips[0]
+        before, after = slip.rms_before, slip.rms_after
+        return GapSize(signal=slip.link.signal, unit=slip.link.unit, rms_before=before, rms_after=after)
     size, link, factor = largest.told, largest.link, largest.factor
     return GapSize(
         signal=TIMING.signal if _is_timing(largest) else link.signal,
@@ -154,11 +166,6 @@ def _size(
         held_out=largest.held_out,
         per_run=run_sizes(largest, residuals.get(link, ())) if isinstance(largest, Judgement) else (),
     )
-
-
-def _size_of_slip(slip: Slip) -> GapSize:
-    link = slip.link
-    return GapSize(signal=link.signal, unit=link.unit, rms_before=slip.rms_before, rms_after=slip.rms_after)
 
 
 def _is_timing(judgement: Judged) -> bool:
@@ -241,29 +248,21 @@ def _causes(
     """Return the causes of all links, the most probable first."""
     causes = [slip_cause(slip) for slip in slips]
     for judgement in judgements:
-        causes += [
-            cause_of(cause, judgement, _reported_in(cause, judgement).name, pairs)
-            for cause in judgement.reported
-        ]
+        for cause in judgement.reported:
+            in_time = TIMING.name in cause.applied.effect.links and _is_timing(judgement)
+            causes.append(cause_of(cause, judgement, (TIMING if in_time else judgement.link).name, pairs))
     return tuple(sorted(causes, key=lambda cause: -cause.probability))
-
-
-def _reported_in(cause: Cause, judgement: Judged) -> Link:
-    """Return the link that a cause is reported in: timing for a gap of the path that is one."""
-    shows_in_time = TIMING.name in cause.applied.effect.links
-    return TIMING if shows_in_time and _is_timing(judgement) else judgement.link
 
 
 def _dependences(signals: Sequence[Judgement]) -> Iterator[tuple[DependsOnResult, Evidence | None]]:
     """Yield on what depends what is left of all links, the largest gap first; of a family what it says."""
     links: set[str] = set()
     for judgement in sorted(signals, key=_weight, reverse=True):
-        of_link: list[tuple[DependsOnResult, Evidence | None]] = [
-            (each, None) for each in impulses_of(judgement)
-        ]
-        of_link += depends_on(judgement, larger_links=len(links))  # its own impulses are no other gap
-        links |= {each.link for each, _ in of_link}
-        yield from of_link
+        impulses = list(impulses_of(judgement))
+        families = list(depends_on(judgement, larger_links=len(links)))  # its own impulses are no other gap
+        yield from ((impulse, None) for impulse in impulses)
+        yield from families
+        links |= {dependence.link for dependence in [*impulses, *(family for family, _ in families)]}
 
 
 def _unexplained(largest: Judgement | None, families: Sequence[DependsOnResult] = ()) -> Unexplained:
@@ -292,13 +291,6 @@ def _not_examined(judgements: Sequence[Judged], slips: Sequence[Slip]) -> Iterat
         if link not in examined:
             needs = "a run that belongs to the prediction" if final else link.needs
             yield NotExamined(link=link.name, needs=needs)
-
-
-def _issues_of_runs(pairs: Sequence[Pair]) -> Iterator[Issue]:
-    """Yield the findings of the runs' files, each with its run's name."""
-    for pair in pairs:
-        for issue in pair.run.issues:
-            yield replace(issue, message=f"{pair.name}: {issue.message}")
 
 
 def _notes(pairs: Sequence[Pair], judgements: Sequence[Judgement]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from gcode2krl.canned.draft import REFERENCE_DWELL_S
 from gcode2krl.effects.dependence import Dependence, Where
 from gcode2krl.effects.mismatch import Mismatch
 from gcode2krl.errors import Issue
+from gcode2krl.gap.answer.evidence import inputs_of
 from gcode2krl.gap.answer.result import (
     OF_POSES,
     AtPart,
@@ -31,13 +32,12 @@ from gcode2krl.gap.answer.result import (
     Unexplained,
     UnknownAt,
 )
-from gcode2krl.gap.answer.words import AXES, FORCE_AXES, listed, number
-from gcode2krl.gap.compare.events import line_at
+from gcode2krl.gap.answer.words import FORCE_AXES, listed, number
+from gcode2krl.gap.compare.events import jump_within, line_at
 from gcode2krl.gap.compare.inputs import Admissible
-from gcode2krl.gap.compare.interpolation import nearest_rows, step_of
-from gcode2krl.gap.compare.jumps import jump_within
+from gcode2krl.gap.compare.interpolation import rms, step_of
 from gcode2krl.gap.compare.links import MECHANICS, TIMING
-from gcode2krl.gap.compare.pair import Pair
+from gcode2krl.gap.compare.pair import Pair, in_base
 from gcode2krl.gap.compare.slips import Slip
 from gcode2krl.gap.compare.trace import Context, Span, Trace, Whose
 from gcode2krl.gap.noise.source import are_repeats, is_revisited
@@ -61,7 +61,7 @@ from gcode2krl.gap.posterior.next_run import (
     choose_next_run,
 )
 from gcode2krl.gap.thresholds import THRESHOLDS, declared_nats
-from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_H, S_PER_MIN
+from gcode2krl.units import S_PER_H, S_PER_MIN
 
 
 def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] = ()) -> CauseResult:
@@ -201,9 +201,6 @@ _LIMITS = THRESHOLDS.answer
 _IN_EACH_RUN = frozenset({Dependence.RUN_TIME})
 """Each run has a course of its own."""
 
-_Input = tuple[str, str, Floats]
-"""Name, unit and values (n,)."""
-
 
 def course_of(
     traces: Sequence[Trace], values: Sequence[Floats], on: Dependence, joint: int | None, unit: str
@@ -212,7 +209,7 @@ def course_of(
 
     An input with several components is told by that which shows most of the deviation.
     """
-    inputs = [_inputs(Admissible(trace), on, joint) for trace in traces]
+    inputs = [inputs_of(Admissible(trace), on, joint) for trace in traces]
     run = None
     if on in _IN_EACH_RUN:
         number = int(np.argmax([np.ptp(each) for each in values]))
@@ -244,55 +241,6 @@ def _bins(x: Floats) -> list[Ints]:
     return [np.flatnonzero(number == each).astype(np.int64) for each in np.unique(number)]
 
 
-def _inputs(inputs: Admissible, on: Dependence, joint: int | None) -> list[_Input]:
-    """Return the components of an input that a deviation can be drawn over."""
-    if joint is not None:
-        of_joint = _of_joint(inputs, on, joint)
-        if of_joint is not None:
-            return [of_joint]
-    if on in (Dependence.RUN_TIME, Dependence.RUN_START):
-        return [("time in the run", "s", inputs.since_start_s)]
-    if on in (Dependence.WALL_CLOCK, Dependence.RUN_TO_RUN):
-        return [("time since the first run's start", "h", inputs.hours)]
-    if on is Dependence.TRAVEL:
-        return [("travel", "m", inputs.travel_mm / MM_PER_M)]
-    if on is Dependence.METRES_CUT:
-        return [("way cut", "m", inputs.cut_m)]
-    if on is Dependence.SPINDLE_SPEED:
-        return [("spindle speed", "1/min", S_PER_MIN / (2.0 * np.pi) * inputs.spindle[:, 0])]
-    if on is Dependence.PLACE:
-        return _along("place", "mm", inputs.position_mm)
-    if on is Dependence.VELOCITY:
-        return _along("velocity", "mm/s", inputs.velocity_mm_s)
-    if on is Dependence.ACCELERATION:
-        return _along("acceleration", "mm/s²", inputs.acceleration_mm_s2)
-    if on in (Dependence.FORCE, Dependence.FORCE_BY_PLACE):
-        return _along("force", "N", inputs.force_N)
-    if on is Dependence.TEMPERATURE:
-        return [(f"temperature {i + 1}", "°C", each) for i, each in enumerate(inputs.temperature_C.T)]
-    return []
-
-
-def _of_joint(inputs: Admissible, on: Dependence, joint: int) -> _Input | None:
-    name = f"A{joint + 1}"
-    if on is Dependence.OWN_ANGLE:
-        return f"angle of {name}", "deg", DEG_PER_RAD * inputs.q_rad[:, joint]
-    if on is Dependence.OWN_TORQUE:
-        return f"torque of {name}", "Nm", inputs.torque_Nm[:, joint]
-    if on is Dependence.VELOCITY:
-        return f"velocity of {name}", "deg/s", DEG_PER_RAD * inputs.rate_rad_s[:, joint]
-    if on is Dependence.ACCELERATION:
-        return f"acceleration of {name}", "deg/s²", DEG_PER_RAD * inputs.acceleration_rad_s2[:, joint]
-    if on is Dependence.JERK:
-        return f"jerk of {name}", "deg/s³", DEG_PER_RAD * inputs.jerk(joint)[:, 0]
-    return None
-
-
-def _along(name: str, unit: str, vectors: Floats) -> list[_Input]:
-    """Return the components of vectors (n, 3) in ``$BASE``."""
-    return [(f"{name} along {axis}", unit, vectors[:, i]) for i, axis in enumerate(AXES)]
-
-
 _FORMS = {
     Dependence.RUN_TIME_STEP: "step",
     Dependence.RUN_TIME: "drift",
@@ -313,12 +261,12 @@ def depends_on(judgement: Judgement, larger_links: int = 0) -> Iterator[tuple[De
 
     With each what the family says. ``larger_links`` have a larger gap without a name.
     """
-    rest = judgement.rest
-    if rest is None or judgement.verdict in ("no_gap", "explained"):
+    study = judgement.rest
+    if study is None or judgement.verdict in ("no_gap", "explained"):
         return
-    if not (rest.worth_naming or rest.is_gap):
+    if not (study.worth_naming or study.is_gap):
         return
-    for family in family_probabilities(rest, larger_links):
+    for family in family_probabilities(study, larger_links):
         if max(family.probability, family.set_probability) >= _LIMITS.least_probability:
             yield _result(judgement, family), family.evidence
 
@@ -329,7 +277,10 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
     is_vector = judgement.traces[0].shape[1] == 3 and not judgement.link.of_joints
     signals = evidence.signal
     if is_vector:
-        signals = tuple(_in_base(trace, own) for trace, own in zip(traces, signals, strict=True))
+        signals = tuple(
+            in_base(signal, trace.frame, trace.inputs, trace.time_s)
+            for trace, signal in zip(traces, signals, strict=True)
+        )
     largest = _largest(signals)
     along = largest if is_step else _main_axis(signals)
     moment = moment_of(traces, evidence.signal, is_smooth=True)
@@ -366,17 +317,6 @@ def _result(judgement: Judgement, family: FamilyProbability) -> DependsOnResult:
         frequency_hz=evidence.at[1] if evidence.on is Dependence.TONE and evidence.at else None,
         course=course,
     )
-
-
-def _in_base(trace: Trace, values: Floats) -> Floats:
-    """Return vectors (n, 3) of a trace along the axes of ``$BASE``."""
-    if not (trace.in_sensor_frame or trace.in_tool_frame):
-        return values
-    inputs = trace.inputs
-    rotation = inputs.sensor_rotation if trace.in_sensor_frame else inputs.tool_rotation
-    rows = nearest_rows(inputs.time_s, trace.time_s)
-    turned: Floats = np.einsum("nij,nj->ni", rotation[rows], values)
-    return turned
 
 
 def _at(evidence: Evidence, signals: tuple[Floats, ...]) -> str:
@@ -552,8 +492,8 @@ def noise_of(judgement: Judgement) -> NoiseResult | None:
     stated = [trace.declared_sigma for trace in traces if trace.declared_sigma is not None]
     return NoiseResult(
         stated=judgement.factor * max(stated) if stated else None,
-        learnt=judgement.factor * _rms([each.sigma for each in models]),
-        short=judgement.factor * _rms([each.short_sigma for each in models]),
+        learnt=judgement.factor * rms(np.array([each.sigma for each in models])),
+        short=judgement.factor * rms(np.array([each.short_sigma for each in models])),
         source=_source(traces),
     )
 
@@ -562,10 +502,6 @@ def _source(traces: Sequence[Trace]) -> str:
     if traces[0].still:
         return _REPEATS if is_revisited(traces) else OF_POSES
     return _REPEATS if are_repeats(traces) else _RUNS
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def readings_of_noise(judgements: Sequence[Judgement]) -> Iterator[str]:

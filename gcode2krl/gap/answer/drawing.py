@@ -8,7 +8,6 @@ loads matplotlib, so it is imported only where a picture is asked for.
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -71,7 +70,7 @@ def write_pictures(gap: Gap, folder: Path, inputs: Iterable[str | Path] = ()) ->
         return []
     make_folder(folder)
     figures = {folder / f"gap_{_file_name(run.run)}.png": run_figure(gap, run) for run in evidence.runs}
-    write_together({file: partial(_save, figure) for file, figure in figures.items()}, inputs)
+    write_together({file: picture_bytes(figure) for file, figure in figures.items()}, inputs)
     return list(figures)
 
 
@@ -86,7 +85,9 @@ def figure_of_run(gap: Gap, run: str | None) -> Figure:
 
 def run_figure(gap: Gap, run: RunEvidence) -> Figure:
     """Draw one run: the residual over time, the path coloured by it, and its dependence if one is known."""
-    evidence = _of(gap)
+    evidence = gap.evidence
+    if evidence is None:
+        raise ValueError("nothing was compared, so there is nothing to draw")
     signal = SIGNALS.get(evidence.signal, evidence.signal)
     title = f"{run.run}: measured minus predicted, {signal}"
     with look():
@@ -228,12 +229,6 @@ def largest_size(evidence: Evidence) -> float:
     return max(float(np.percentile(sizes, 99.0)), 1e-12)
 
 
-def _of(gap: Gap) -> Evidence:
-    if gap.evidence is None:
-        raise ValueError("nothing was compared, so there is nothing to draw")
-    return gap.evidence
-
-
 def _add_lines(axes: Axes, run: RunEvidence) -> None:
     """Add G-code lines along the top."""
     if not np.any(run.line > 0):
@@ -263,10 +258,6 @@ def _say(axes: Axes, words: str) -> None:
 
 def _file_name(run: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in run)
-
-
-def _save(figure: Figure, file: Path) -> None:
-    figure.savefig(file, dpi=DPI, format="png")
 
 
 _COLOURS = 24
@@ -348,21 +339,22 @@ def strip(evidence: Evidence, run: RunEvidence, intervals: Sequence[IntervalResu
 def points(run: RunEvidence) -> dict[str, list[Any]]:
     """Return what the slider shows at each of its places: time, line, sizes, and where each view has it."""
     rows = rows_of(run)
-    columns: dict[str, list[Any]] = {
+    at = []
+    if run.position_mm is not None:
+        flat = (_flat(run.position_mm[rows], axes) for axes in views_of(run))
+        at = [[[round(float(x), 2), round(float(y), 2)] for x, y in place] for place in flat]
+    return {
         "t": [round(float(value), 3) for value in run.time_s[rows]],
-        "line": [int(value) for value in run.line[rows]],
+        "line": run.line[rows].tolist(),
         "before": [float(f"{value:.3g}") for value in run.size_before[rows]],
         "after": [float(f"{value:.3g}") for value in run.size_after[rows]],
-        "at": [],
+        "at": at,
     }
-    if run.position_mm is not None:
-        for first, second in views_of(run):
-            place = run.position_mm[rows]
-            scale = _stretch(place, (first, second))
-            columns["at"].append(
-                [[round(float(x), 2), round(float(-scale * y), 2)] for x, y in place[:, [first, second]]]
-            )
-    return columns
+
+
+def _flat(place: Floats, axes: tuple[int, int]) -> Floats:
+    """Return places (n, 3) along two axes (n, 2), y downwards."""
+    return np.stack([place[:, axes[0]], -_stretch(place, axes) * place[:, axes[1]]], axis=1)
 
 
 def scale_colours() -> list[str]:
@@ -372,12 +364,11 @@ def scale_colours() -> list[str]:
 
 def rows_of(run: RunEvidence) -> Any:
     """Return the rows that are drawn, at most 900."""
-    return np.arange(0, len(run.time_s), max(1, -(-len(run.time_s) // _MOST_POINTS)))
+    return _some(len(run.time_s), _MOST_POINTS)
 
 
 def _view(place: Floats, colour: Any, axes: tuple[int, int]) -> View:
-    scale = _stretch(place, axes)
-    flat = np.stack([place[:, axes[0]], -scale * place[:, axes[1]]], axis=1)
+    scale, flat = _stretch(place, axes), _flat(place, axes)
     low, span = flat.min(axis=0), np.ptp(flat, axis=0)
     margin = _MARGIN * max(float(span.max()), 1e-6)
     low, span = low - margin, span + 2.0 * margin
@@ -429,18 +420,6 @@ _VERDICTS = {
 }
 
 
-@dataclass(frozen=True)
-class RunOnPage:
-    """One run as the page shows it."""
-
-    name: str
-    views: list[View]
-    strip: Strip
-    points: dict[str, list[Any]]
-    picture: str
-    """PNG in base 64."""
-
-
 def write_page(gap: Gap, file: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Write the page; raises `NotUnderstoodError` where the file cannot be written or is an input."""
     write_together({file: page(gap).encode("utf-8")}, inputs)
@@ -473,14 +452,15 @@ def page(gap: Gap) -> str:
     )
 
 
-def _run(gap: Gap, evidence: Evidence, run: RunEvidence) -> RunOnPage:
-    return RunOnPage(
-        name=run.run,
-        views=views(evidence, run),
-        strip=strip(evidence, run, gap.where.intervals),
-        points=points(run),
-        picture=b64encode(picture_bytes(run_figure(gap, run))).decode("ascii"),
-    )
+def _run(gap: Gap, evidence: Evidence, run: RunEvidence) -> dict[str, Any]:
+    """Return one run as the page shows it, its picture as PNG in base 64."""
+    return {
+        "name": run.run,
+        "views": views(evidence, run),
+        "strip": strip(evidence, run, gap.where.intervals),
+        "points": points(run),
+        "picture": b64encode(picture_bytes(run_figure(gap, run))).decode("ascii"),
+    }
 
 
 def _cause(cause: CauseResult) -> dict[str, Any]:

@@ -1,15 +1,15 @@
 """What the pictures of an answer are drawn from: the residual of each run over time, place and one input."""
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.effects import Dependence, Inputs, arm
-from gcode2krl.effects.inputs import gradient
+from gcode2krl.effects import Dependence, Inputs
 from gcode2krl.effects.operators import since_reversal
-from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s
+from gcode2krl.gap.compare.inputs import Admissible
+from gcode2krl.gap.compare.interpolation import nearest_rows, rms, running_mean, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, JOINTS, MECHANICS
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.noise.nuisance import nuisance_for
@@ -17,7 +17,7 @@ from gcode2krl.gap.posterior.examination import fitted_mismatch
 from gcode2krl.gap.posterior.judgement import Judgement
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.units import DEG_PER_RAD
+from gcode2krl.units import DEG_PER_RAD, MM_PER_M, S_PER_MIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,132 +39,122 @@ def knows_place(inputs: Inputs) -> bool:
     return bool(np.any(inputs.position_mm))
 
 
-def against(trace: Trace, samples: Ints, at: str | None, on: Set[Dependence]) -> Against | None:
-    """Return the first input of a family that can be shown, None where there is none.
+_Input = tuple[str, str, Floats]
+"""Name, unit and values (n,)."""
 
-    Parameters
-    ----------
-    samples : (n,) rows of the trace's inputs.
-    at : the joint where the gap is, or None.
-    """
-    for dependence, shown in _SHOWN.items():
-        if dependence in on:
-            values = shown(trace, samples, at)
-            if values is not None:
-                return values
+
+def inputs_of(inputs: Admissible, on: Dependence, joint: int | None) -> list[_Input]:
+    """Return the components of an input that a deviation can be drawn over; none of what is no function."""
+    if joint is not None:
+        of_joint = _of_joint(inputs, on, joint)
+        if of_joint is not None:
+            return [of_joint]
+    match on:
+        case Dependence.RUN_TIME | Dependence.RUN_START:
+            return [("time in the run", "s", inputs.since_start_s)]
+        case Dependence.WALL_CLOCK | Dependence.RUN_TO_RUN:
+            return [("time since the first run's start", "h", inputs.hours)]
+        case Dependence.TRAVEL:
+            return [("travel", "m", inputs.travel_mm / MM_PER_M)]
+        case Dependence.METRES_CUT:
+            return [("way cut", "m", inputs.cut_m)]
+        case Dependence.SPINDLE_SPEED:
+            return [("spindle speed", "1/min", S_PER_MIN / (2.0 * np.pi) * inputs.spindle[:, 0])]
+        case Dependence.PLACE:
+            return _along("place", "mm", inputs.position_mm)
+        case Dependence.VELOCITY:
+            return _along("velocity", "mm/s", inputs.velocity_mm_s)
+        case Dependence.ACCELERATION:
+            return _along("acceleration", "mm/s²", inputs.acceleration_mm_s2)
+        case Dependence.FORCE | Dependence.FORCE_BY_PLACE:
+            return _along("force", "N", inputs.force_N)
+        case Dependence.TEMPERATURE:
+            return [(f"temperature {i + 1}", "°C", each) for i, each in enumerate(inputs.temperature_C.T)]
+    return []
+
+
+def _of_joint(inputs: Admissible, on: Dependence, joint: int) -> _Input | None:
+    name = JOINTS[joint]
+    match on:
+        case Dependence.OWN_ANGLE:
+            return f"angle of {name}", "deg", DEG_PER_RAD * inputs.q_rad[:, joint]
+        case Dependence.OWN_TORQUE:
+            return f"torque of {name}", "Nm", inputs.torque_Nm[:, joint]
+        case Dependence.VELOCITY:
+            return f"velocity of {name}", "deg/s", DEG_PER_RAD * inputs.rate_rad_s[:, joint]
+        case Dependence.ACCELERATION:
+            return f"acceleration of {name}", "deg/s²", DEG_PER_RAD * inputs.acceleration_rad_s2[:, joint]
+        case Dependence.JERK:
+            return f"jerk of {name}", "deg/s³", DEG_PER_RAD * inputs.jerk(joint)[:, 0]
     return None
 
 
-_Shown = Callable[[Trace, Ints, str | None], Against | None]
+def _along(name: str, unit: str, vectors: Floats) -> list[_Input]:
+    """Return the components of vectors (n, 3) in ``$BASE``."""
+    return [(f"{name} along {axis}", unit, vectors[:, i]) for i, axis in enumerate("xyz")]
 
 
-def _joint(at: str | None) -> int | None:
-    return JOINTS.index(at) if at in JOINTS else None
-
-
-def _reversals(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint = _joint(at)
-    if joint is None:
-        return None
-    inputs = trace.inputs
-    direction, since = since_reversal(inputs.q_cmd_rad[:, joint], inputs.time_s)
-    shown = np.where(np.isfinite(since), since, np.nan)[samples]
-    if not np.isfinite(shown).any():
-        return None
-    return Against(f"time since {at} reversed (s)", shown, direction[samples])
-
-
-def _torque(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint, inputs = _joint(at), trace.inputs
-    if joint is None or not knows_place(inputs):
-        return None
-    load = inputs.force_base_N if inputs.load_base_N is None else inputs.load_base_N
-    torque = arm.torque_Nm(inputs.jacobian, load, inputs.moment_base_Nmm)
-    return Against(f"torque about {at} by the load at the tip (N·m)", torque[samples, joint])
-
-
-def _angle(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint = _joint(at)
-    if joint is None:
-        return None
-    q_rad = trace.inputs.q_cmd_rad[:, joint]
-    direction, _ = since_reversal(q_rad, trace.inputs.time_s)
-    return Against(f"angle of {at} (deg)", DEG_PER_RAD * q_rad[samples], direction[samples])
-
-
-def _speed(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint, inputs = _joint(at), trace.inputs
-    if joint is not None:
-        speed = inputs.rate_rad_s[samples, joint]
-        return Against(f"speed of {at} (deg/s)", DEG_PER_RAD * speed)
-    if not knows_place(inputs):
-        return None
-    return Against("speed of the tip (mm/s)", np.linalg.norm(inputs.velocity_mm_s[samples], axis=1))
-
-
-def _acceleration(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint, inputs = _joint(at), trace.inputs
-    if joint is not None:
-        rate = gradient(inputs.rate_rad_s, inputs.time_s)[samples, joint]
-        return Against(f"acceleration of {at} (deg/s²)", DEG_PER_RAD * rate)
-    rate = gradient(inputs.velocity_mm_s, inputs.time_s)[samples]
-    return Against("acceleration of the tip (mm/s²)", np.linalg.norm(rate, axis=1))
-
-
-def _jerk(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    joint, inputs = _joint(at), trace.inputs
-    if joint is None:
-        return None
-    acceleration = gradient(inputs.rate_rad_s[:, joint], inputs.time_s)
-    return Against(f"jerk of {at} (deg/s³)", DEG_PER_RAD * gradient(acceleration, inputs.time_s)[samples])
-
-
-def _force(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    force = trace.inputs.force_base_N[samples]
-    if not np.any(force):
-        return None
-    return Against("predicted force (N)", np.linalg.norm(force, axis=1))
-
-
-def _travel(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    return Against("travel (m)", trace.inputs.path_mm[samples] / 1000.0)
-
-
-def _time(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    return Against("time in the run (s)", trace.time_s)
-
-
-def _clock(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    return Against("time since the first run's start (h)", trace.inputs.run_hours[samples], across_runs=True)
-
-
-def _spindle(trace: Trace, samples: Ints, at: str | None) -> Against | None:
-    return Against("spindle speed (1/min)", trace.inputs.spindle_rad_s[samples] * 30.0 / np.pi)
-
-
-_SHOWN: Mapping[Dependence, _Shown] = {
-    Dependence.OWN_TORQUE: _torque,
-    Dependence.REVERSALS: _reversals,
-    Dependence.MOTOR_ANGLE: _angle,
-    Dependence.OWN_ANGLE: _angle,
-    Dependence.METRES_CUT: _travel,
-    Dependence.TRAVEL: _travel,
-    Dependence.FORCE: _force,
-    Dependence.FORCE_BY_PLACE: _force,
-    Dependence.JERK: _jerk,
-    Dependence.ACCELERATION: _acceleration,
-    Dependence.VELOCITY: _speed,
-    Dependence.SPINDLE_SPEED: _spindle,
-    Dependence.WALL_CLOCK: _clock,
-    Dependence.RUN_TO_RUN: _clock,
-    Dependence.PLACE: _travel,
-    Dependence.RUN_START: _time,
-    Dependence.RUN_TIME_STEP: _time,
-    Dependence.RUN_TIME: _time,
-    Dependence.TONE: _time,
-    Dependence.CONSTANT: _time,
+_SHOWN = {
+    Dependence.OWN_TORQUE: Dependence.OWN_TORQUE,
+    Dependence.REVERSALS: Dependence.REVERSALS,
+    Dependence.MOTOR_ANGLE: Dependence.OWN_ANGLE,
+    Dependence.OWN_ANGLE: Dependence.OWN_ANGLE,
+    Dependence.METRES_CUT: Dependence.METRES_CUT,
+    Dependence.TRAVEL: Dependence.TRAVEL,
+    Dependence.FORCE: Dependence.FORCE,
+    Dependence.FORCE_BY_PLACE: Dependence.FORCE,
+    Dependence.JERK: Dependence.JERK,
+    Dependence.ACCELERATION: Dependence.ACCELERATION,
+    Dependence.VELOCITY: Dependence.VELOCITY,
+    Dependence.SPINDLE_SPEED: Dependence.SPINDLE_SPEED,
+    Dependence.WALL_CLOCK: Dependence.WALL_CLOCK,
+    Dependence.RUN_TO_RUN: Dependence.RUN_TO_RUN,
+    Dependence.PLACE: Dependence.TRAVEL,
+    Dependence.RUN_START: Dependence.RUN_TIME,
+    Dependence.RUN_TIME_STEP: Dependence.RUN_TIME,
+    Dependence.RUN_TIME: Dependence.RUN_TIME,
+    Dependence.TONE: Dependence.RUN_TIME,
+    Dependence.CONSTANT: Dependence.RUN_TIME,
 }
-"""In this order: the more an input says about a cause, the earlier."""
+"""What a gap depends on -> the input that it is drawn over; the more that says about a cause, the earlier."""
+
+
+def against(trace: Trace, at: str | None, on: Set[Dependence]) -> Against | None:
+    """Return the first input of a family that can be shown, None where there is none.
+
+    ``at`` : the joint where the gap is, or None.
+    """
+    inputs, joint = Admissible(trace), JOINTS.index(at) if at in JOINTS else None
+    shown = (_against(inputs, over, joint) for dependence, over in _SHOWN.items() if dependence in on)
+    return next((each for each in shown if each is not None), None)
+
+
+def _against(inputs: Admissible, on: Dependence, joint: int | None) -> Against | None:
+    model = inputs.trace.inputs
+    direction = None if joint is None else inputs.directions[:, joint]
+    if joint is not None and on is Dependence.REVERSALS:
+        since_s = since_reversal(model.q_cmd_rad[:, joint], model.time_s)[1]
+        rows = nearest_rows(model.time_s, inputs.trace.time_s)
+        shown = np.where(np.isfinite(since_s), since_s, np.nan)[rows]
+        name = f"time since {JOINTS[joint]} reversed (s)"
+        return Against(name, shown, direction) if np.isfinite(shown).any() else None
+    if on is Dependence.OWN_TORQUE:  # the weight of the links would hide the load
+        if joint is None or not knows_place(model):
+            return None
+        name = f"torque about {JOINTS[joint]} by the load at the tip (N·m)"
+        return Against(name, inputs.load_torque_Nm[:, joint])
+    components = inputs_of(inputs, on, joint)
+    if not components or (len(components) == 3 and not np.any([each[2] for each in components])):
+        return None
+    name, unit, values = components[0]
+    if len(components) == 3:
+        name, values = name.removesuffix(" along x"), np.linalg.norm([each[2] for each in components], axis=0)
+    return Against(
+        f"{name} ({unit})",
+        values,
+        direction if on is Dependence.OWN_ANGLE else None,
+        across_runs=on in (Dependence.WALL_CLOCK, Dependence.RUN_TO_RUN),
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -208,12 +198,9 @@ def residuals_of(judgement: Judgement) -> list[Residual]:
 
 def smoothed(time_s: Floats, values: Floats, over_s: float = THRESHOLDS.answer.smooth_s) -> Floats:
     """Return the mean of values (n,) or (n, k) over a time, that of fewer samples at the ends."""
-    if values.ndim == 2:
-        return np.stack([smoothed(time_s, column, over_s) for column in values.T], axis=1)
     step_s = usual_step_s(time_s) if len(time_s) > 1 else over_s
-    kernel = np.ones(min(max(1, round(over_s / step_s)), len(values)))
-    sums: Floats = np.convolve(values, kernel, mode="same")
-    return sums / np.convolve(np.ones(len(values)), kernel, mode="same")
+    rows = min(round(over_s / step_s), len(values))
+    return running_mean(values.reshape(len(values), -1), rows).reshape(values.shape)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -273,9 +260,9 @@ def evidence_of(judgement: Judgement, residuals: Sequence[Residual], depends: De
     return Evidence(
         signal=judgement.link.signal,
         component=component,
-        unit=first.unit,
+        unit=first.link.unit,
         noise=noise * first.factor,
-        size_unit="mm" if in_mm else first.unit,
+        size_unit="mm" if in_mm else first.link.unit,
         runs=runs,
     )
 
@@ -307,7 +294,7 @@ def _run(residual: Residual, along: Floats, in_mm: bool, depends: Depends | None
         after=trace.factor * np.sum(along * residual.after, axis=1),
         size_before=size(residual.before),
         size_after=size(residual.after),
-        against=None if depends is None else against(trace, samples, depends.at, depends.on),
+        against=None if depends is None else against(trace, depends.at, depends.on),
     )
 
 
@@ -330,7 +317,7 @@ def _component(residuals: Sequence[Residual], at: str | None) -> tuple[str, list
         along = [_along_joint(each.trace, joint) for each in residuals]
         return f"along what {at} moves", along, rms(noise)
     direction = _principal(shapes)
-    axes = " of the sensor" if first.in_sensor_frame else ""
+    axes = " of the sensor" if first.frame == "sensor" else ""
     text = ", ".join(f"{value:.1f}" for value in np.round(direction, 1) + 0.0)
     name = "force" if first.link is FORCE else "tip"
     deviation = float(np.sqrt(np.sum((direction * noise) ** 2)))

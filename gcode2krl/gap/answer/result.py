@@ -21,51 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SCHEMA = "gcode2krl/gap/1"
-_NAMES = {"source": "from"}
+_NAMES = {"source": "from", "answer": "if", "shows": "then"}
 """Names of the contract that Python keeps for itself."""
 _LEFT_OUT_WHERE_NONE = frozenset({"offset_deg", "words", "rivals", "behind_nats", "moment", "together"})
 """Keys that only some links and causes have; others are null where nothing is known."""
 
 
-def gap_object(gap: Any) -> dict[str, Any]:
-    """Return the object of a `Gap`, its keys in the order of the contract; what is not finite is None."""
-    return {
-        "schema": SCHEMA,
-        "verdict": gap.verdict,
-        "gap": plain(gap.gap),
-        "at_part": plain(gap.at_part),
-        "links": plain(gap.links),
-        "where": plain(gap.where),
-        "events": plain(gap.events),
-        "causes": plain(gap.causes),
-        "unexplained": _unexplained(gap.unexplained),
-        "not_examined": plain(gap.not_examined),
-        "observable": plain(gap.observable),
-        "next_run": _next_run(gap.next_run),
-        "runs": list(gap.runs),
-        "notes": list(gap.notes),
-        "issues": [_issue(issue) for issue in gap.issues],
-    }
-
-
-def _unexplained(unexplained: Any) -> dict[str, Any]:
-    """Return what is left; a moment is ``t_s`` as in events, and ``at_time_s`` as it was first called."""
-    entry: dict[str, Any] = plain(unexplained)
-    for dependence in entry["depends_on"]:
-        dependence["t_s"] = dependence["at_time_s"]
-    return entry
-
-
-def _next_run(run: Any) -> dict[str, Any] | None:
-    """Return the next run with its pairs of answers as lists; None where nothing is left to part."""
-    if run is None:
-        return None
-    return {
-        "program": run.program,
-        "minutes": plain(run.minutes),
-        "separates": [[each.first, each.second, plain(each.odds)] for each in run.separates],
-        "expect": [{"if": each.answer, "then": each.shows} for each in run.expect],
-    }
+_ORDER = (
+    *("verdict", "gap", "at_part", "links", "where", "events", "causes", "unexplained", "not_examined"),
+    *("observable", "next_run", "runs", "notes", "issues"),
+)
+"""Keys of the JSON object, behind that of its schema."""
+_OF_ISSUES = ("severity", "code", "line", "message", "remedy")
 
 
 def plain(value: Any) -> Any:
@@ -90,16 +57,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value
-
-
-def _issue(issue: Issue) -> dict[str, Any]:
-    return {
-        "severity": issue.severity,
-        "code": issue.code,
-        "line": issue.line,
-        "message": issue.message,
-        "remedy": issue.remedy,
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -508,8 +465,16 @@ class Gap:
         return tuple(cause for cause in self.causes if cause.is_named)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the object of the JSON contract, plain numbers only."""
-        return gap_object(self)
+        """Return the object of the JSON contract, plain numbers only; what is not finite is None."""
+        made: dict[str, Any] = {"schema": SCHEMA} | {name: plain(getattr(self, name)) for name in _ORDER}
+        for dependence in made["unexplained"]["depends_on"]:
+            # a moment is t_s as in events, and at_time_s as it was first called
+            dependence["t_s"] = dependence["at_time_s"]
+        made["issues"] = [{name: getattr(issue, name) for name in _OF_ISSUES} for issue in self.issues]
+        if self.next_run is not None:
+            pairs = made["next_run"]["separates"]
+            made["next_run"]["separates"] = [[each["first"], each["second"], each["odds"]] for each in pairs]
+        return made
 
     @property
     def findings(self) -> Findings:

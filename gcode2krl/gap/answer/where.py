@@ -49,7 +49,7 @@ def place(
         for trace, shape in zip(traces, shapes, strict=True)
         for interval in _intervals(trace, shape, _stretches(trace, shape, noise, least_s), power, joints)
     ]
-    is_vector = traces[0].link in (FORCE, MECHANICS) and not traces[0].in_sensor_frame
+    is_vector = traces[0].link in (FORCE, MECHANICS) and traces[0].frame != "sensor"
     return Where(
         intervals=tuple(sorted(intervals, key=lambda interval: -(interval.share or 0.0))),
         direction_base=_direction(shapes) if is_vector else None,

@@ -375,8 +375,8 @@ def _hit(gap: Gap) -> str:
     others = [each for each in gap.events if each.what != "burst" and each.link != event.link]
     together = [each for each in others if each.run == event.run and _is_near(each.t_s, event.t_s)]
     stays = any(
-        each.form == "step" and each.run == event.run and _is_near(each.at_time_s or 0.0, event.t_s)
-        for each in gap.unexplained.depends_on
+        family.form == "step" and family.run == event.run and _is_near(family.at_time_s or 0.0, event.t_s)
+        for family in gap.unexplained.depends_on
     )
     if event.link == "force" and (step or together or stays):
         said = f"The tool hit something {at}: {_force(event.size)}"

@@ -22,7 +22,7 @@ from gcode2krl.gap.compare.interpolation import cubic, length_along, rms, usual_
 from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.trace import Context, Link, Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.runs import Controller, Measured
+from gcode2krl.runs import Controller, Tracker
 from gcode2krl.runs.matching import best_shift
 
 _LIMITS = THRESHOLDS.compare
@@ -57,8 +57,7 @@ def _rms(traces: Sequence[Trace], applied: Sequence[Applied]) -> float:
     for trace in traces:
         late, moves = late_s(trace, trace.measured - trace.sample(applied))
         values.append(late[moves])
-    every = np.concatenate(values)
-    return rms(every) if len(every) else 0.0
+    return rms(np.concatenate(values)) if any(map(len, values)) else 0.0
 
 
 def residual_by_place(trace: Trace, applied: Sequence[Applied]) -> Floats:
@@ -134,7 +133,7 @@ def _shifted(trace: Trace, offset_s: float) -> Floats:
     return replace(trace, time_s=trace.time_s - offset_s).nominal
 
 
-def with_table_clock(pair: Pair, link: "Link") -> Pair:
+def with_table_clock(pair: Pair, link: Link) -> Pair:
     """Return the pair with the clock of a link's table set as its trace fits best."""
     traces = link.traces([pair])
     if not traces:
@@ -152,7 +151,7 @@ def with_coarse_clocks(pair: Pair) -> Pair:
     return replace(pair, clock_s={name: offset for name, offset in offsets.items() if offset != 0.0})
 
 
-def with_controller_clocks(context: Context, path: "Link") -> Context:
+def with_controller_clocks(context: Context, path: Link) -> Context:
     """Return the context with the controllers' clocks set run by run, where runs keep to the plan's times.
 
     What is common to all of them stays where it is a finding. Where runs do not keep to the plan, their
@@ -178,7 +177,7 @@ def with_controller_clocks(context: Context, path: "Link") -> Context:
     return replace(context.with_pairs(later(kept_s)), clocks_set=True)
 
 
-def coarse_offset(pair: Pair, table: Measured) -> float:
+def coarse_offset(pair: Pair, table: Controller | Tracker) -> float:
     """Return the offset of a table of up to 10 s by how its motion follows the prediction; 0 where small."""
     inputs = pair.inputs
     if isinstance(table, Controller):
@@ -188,23 +187,16 @@ def coarse_offset(pair: Pair, table: Measured) -> float:
         known = np.isfinite(path_rad).all(axis=0)
         measured, predicted = path_rad[:, known], inputs.q_cmd_rad[:, known]
     else:
-        position: Floats | None = getattr(table, "position_mm", None)
-        if position is None:
-            return 0.0
-        measured, predicted = position, inputs.position_mm
+        measured, predicted = table.position_mm, inputs.position_mm
     if measured.shape[1] == 0 or float(np.ptp(predicted, axis=0).max()) == 0.0:
         return 0.0
     shift = best_shift(inputs.time_s, predicted, table.time_s, measured, _LIMITS.clock_reach_s)
     here = _apart(predicted, measured, table.time_s, inputs.time_s, 0.0)
     there = _apart(predicted, measured, table.time_s, inputs.time_s, shift.seconds)
-    constant = there < _LIMITS.clock_left * here or there < _LIMITS.clock_nothing * float(
-        np.sum(np.var(measured, axis=0))
-    )
-    return (
-        shift.seconds
-        if abs(shift.seconds) > _LIMITS.clock_large_s and shift.share >= _LIMITS.clock_follows and constant
-        else 0.0
-    )
+    power = float(np.sum(np.var(measured, axis=0)))
+    is_constant = there < _LIMITS.clock_left * here or there < _LIMITS.clock_nothing * power
+    is_large = abs(shift.seconds) > _LIMITS.clock_large_s and shift.share >= _LIMITS.clock_follows
+    return shift.seconds if is_large and is_constant else 0.0
 
 
 def _apart(predicted: Floats, measured: Floats, own_s: Floats, time_s: Floats, offset_s: float) -> float:
@@ -230,49 +222,41 @@ def retimed(pair: Pair) -> Pair:
     inputs, own_s = pair.inputs, pair.stamps(table)
     travelled = length_along(path_rad)
     wanted = length_along(inputs.q_cmd_rad)
-    if (
-        travelled[-1] <= 0.0
-        or wanted[-1] <= 0.0
-        or abs(travelled[-1] / wanted[-1] - 1.0) > _LIMITS.retime_same_length
-    ):
+    ratio = travelled[-1] / wanted[-1] if wanted[-1] > 0.0 else 0.0
+    if ratio == 0.0 or abs(ratio - 1.0) > _LIMITS.retime_same_length:
         return pair
     # a rest takes time and no way: a little way for every second keeps the times in order
-    along = wanted * (travelled[-1] / wanted[-1]) + _LIMITS.retime_still * inputs.time_s
+    along = wanted * ratio + _LIMITS.retime_still * inputs.time_s
     time_s = np.interp(along, travelled + _LIMITS.retime_still * own_s, own_s)
     return _at_times(pair, time_s)
 
 
-def refined(pair: Pair, path: "Link") -> Pair:
+def refined(pair: Pair, path: Link) -> Pair:
     """Return the pair with its times moved by the lateness of the run, up to some hundredths of a second.
 
     The lateness comes from the commanded joints along the motion and is interpolated over rests.
     """
+    from scipy.ndimage import uniform_filter1d
+
     for _ in range(_LIMITS.retime_rounds):
         traces = path.traces([pair])
         if not traces or traces[0].shape[1] < 6:
             return pair
         trace = traces[0]
         late, moves = late_s(trace, trace.residual)
-        if (
-            np.count_nonzero(moves) < _LIMITS.retime_smooth_rows
-            or float(np.abs(late[moves]).max()) < _LIMITS.retime_negligible_s
-        ):
+        if np.count_nonzero(moves) < _LIMITS.retime_smooth_rows:
             return pair
-        if float(np.quantile(np.abs(late[moves]), 0.95)) > _LIMITS.retime_far_s:
+        sizes_s = np.abs(late[moves])
+        if sizes_s.max() < _LIMITS.retime_negligible_s or np.quantile(sizes_s, 0.95) > _LIMITS.retime_far_s:
             return pair
-        kernel = np.ones(_LIMITS.retime_smooth_rows) / _LIMITS.retime_smooth_rows
-        padded = np.pad(
-            np.clip(late[moves], -_LIMITS.retime_far_s, _LIMITS.retime_far_s),
-            _LIMITS.retime_smooth_rows // 2,
-            mode="edge",
-        )
-        smooth = np.convolve(padded, kernel, mode="valid")
+        near = np.clip(late[moves], -_LIMITS.retime_far_s, _LIMITS.retime_far_s)
+        smooth = uniform_filter1d(near, _LIMITS.retime_smooth_rows, mode="nearest")
         now = pair.inputs.time_s
         pair = _at_times(pair, now + np.interp(now, trace.time_s[moves], smooth))
     return pair
 
 
-def on_own_timing(pair: Pair, servo: "Link") -> Pair:
+def on_own_timing(pair: Pair, servo: Link) -> Pair:
     """Return a pair of actual joints alone on the run's own timing; others as they are.
 
     A constant offset is the clock's: the median of those of the joints, so that the lag of one axis stays.

@@ -29,6 +29,12 @@ no median, and in a burst of the instrument every median moves.
 **Hum of the mains.** Tones at multiples of 50 or 60 Hz, folded by the sampling. The grid keeps its frequency
 to some tens of millihertz, whatever the robot does; nothing of a robot or of a cut is bound to it but a
 spindle that turns at that speed, and then nothing is taken off.
+
+**Jumps.** In a window of 2·h rows about a moment each component is a cubic and a jump; how surprising the
+jump is, is the log-likelihood ratio N·log(S/(S - g)) of least squares with and without it, N the rows, S the
+sum of squares beside the cubic and g what the jump takes of it (Quandt 1958, in a moving window). What a
+clock or a lag takes goes first: where joints stop and start it jumps in every sound run. Only the order of
+moments matters here: an effect that begins at one of them is judged on all data.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,9 +48,10 @@ from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.effects import Inputs
 from gcode2krl.gap.compare.inputs import Admissible
 from gcode2krl.gap.compare.interpolation import Bands, linear, resolution, usual_deviation, usual_step_s
-from gcode2krl.gap.compare.trace import Event, Span, Trace, Whose, with_rows
+from gcode2krl.gap.compare.pair import force_jumps
+from gcode2krl.gap.compare.trace import Event, Span, Trace, Whose, is_repeat, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
-from gcode2krl.units import RAD_PER_REV
+from gcode2krl.units import RAD_PER_REV, S_PER_H
 
 _LIMITS = THRESHOLDS.compare
 _WEIGHTS = (1.0, -4.0, 6.0, -4.0, 1.0)
@@ -282,8 +289,6 @@ _MOMENT_S = 0.1
 """Over which changes of the rest are compared with those of the motion."""
 _FAR, _RIDGE = 6.0, 1e-6
 """Robust deviations beyond which a row does not tell what follows the motion; columns of unit mean square."""
-_SAME_MM = 1e-3
-"""Repeats of a program have the same path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,6 +298,17 @@ class _Stretch:
     first: int
     last: int
     is_pulse: bool
+
+    @property
+    def is_outlier(self) -> bool:
+        return not self.is_pulse and self.last - self.first <= _OUTLIER_ROWS
+
+    def is_in(self, rows: Bools) -> bool:
+        """Tell whether any of its rows is among some (n,)."""
+        return bool(rows[self.first : self.last].any())
+
+    def span(self, trace: Trace) -> Span:
+        return float(trace.time_s[self.first]), float(trace.time_s[self.last - 1])
 
 
 def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]]) -> list[Trace]:
@@ -314,11 +330,11 @@ def sorted_out(traces: Sequence[Trace], elsewhere: Mapping[str, Sequence[Span]])
             traces, rests, stretches, commanded, repeated, coincident, strict=True
         )
     ]
-    return (
-        [_of_a_bursty_instrument(trace) for trace in sorted_traces]
-        if _is_bursty(sorted_traces)
-        else sorted_traces
-    )
+    # a tracker or a force sensor that bursts so often: a pulse of it may be a burst, too
+    bursts = sum(event.whose is Whose.INSTRUMENT for trace in sorted_traces for event in trace.events)
+    if traces[0].link.of_joints or bursts < _LIMITS.bursty_least:
+        return sorted_traces
+    return [replace(trace, events=tuple(map(_as_burst, trace.events))) for trace in sorted_traces]
 
 
 def line_at(inputs: Inputs, at_s: float) -> int:
@@ -331,8 +347,8 @@ def rough_spans(traces: Sequence[Trace]) -> dict[str, list[Span]]:
     """Return of each run the times at which a signal is rough or in a pulse, outliers apart."""
     spans: dict[str, list[Span]] = {}
     for trace in traces:
-        kept = [each for each in _stretches(trace, _rest(trace)) if not _is_outlier(each)]
-        spans.setdefault(trace.run, []).extend(_span(trace, each) for each in kept)
+        kept = [each for each in _stretches(trace, _rest(trace)) if not each.is_outlier]
+        spans.setdefault(trace.run, []).extend(each.span(trace) for each in kept)
     return spans
 
 
@@ -415,14 +431,6 @@ def _is_edge(trace: Trace, calm: Floats) -> Bools:
     return edge
 
 
-def _is_outlier(stretch: _Stretch) -> bool:
-    return not stretch.is_pulse and stretch.last - stretch.first <= _OUTLIER_ROWS
-
-
-def _span(trace: Trace, stretch: _Stretch) -> Span:
-    return float(trace.time_s[stretch.first]), float(trace.time_s[stretch.last - 1])
-
-
 # What it is in step with
 
 
@@ -436,14 +444,13 @@ def _in_step(
     from scipy.special import bdtrc
 
     inside = [
-        [bool(rows[each.first : each.last].any()) for each in spans]
-        for spans, rows in zip(stretches, chosen, strict=True)
+        [stretch.is_in(rows) for stretch in spans] for spans, rows in zip(stretches, chosen, strict=True)
     ]
     hits = [
-        (hit, bool(rows[(each.first + each.last) // 2]), each.last - each.first)
-        for spans, rows, own in zip(stretches, chosen, inside, strict=True)
-        for each, hit in zip(spans, own, strict=True)
-        if not _is_outlier(each)
+        (stretch.is_in(rows), bool(rows[(stretch.first + stretch.last) // 2]), stretch.last - stretch.first)
+        for spans, rows in zip(stretches, chosen, strict=True)
+        for stretch in spans
+        if not stretch.is_outlier
     ]
     # A long stretch touches chosen rows more often than a row is chosen. Where these are rare and short its
     # middle tells more; where it rings on after them, that it touches them.
@@ -454,7 +461,7 @@ def _in_step(
         chance = bdtrc(counted - 1, len(hits), share) if counted else 1.0
         if counted >= least and chance < _LIMITS.in_step_p:
             return inside
-    return [[False] * len(own) for own in stretches]
+    return [[False] * len(spans) for spans in stretches]
 
 
 def _touched(chosen: Sequence[Bools], length: int) -> float:
@@ -465,36 +472,20 @@ def _touched(chosen: Sequence[Bools], length: int) -> float:
 
 def command_changes(trace: Trace) -> Bools:
     """Return the rows (n,) shortly after the command jerks, a joint turns back or the force jumps."""
-    inputs = trace.inputs
-    time_s = inputs.time_s
-    if len(time_s) < 5:
-        return np.zeros(len(trace.time_s), dtype=np.bool_)
+    inputs, time_s = trace.inputs, trace.inputs.time_s
     rate = np.gradient(inputs.q_cmd_rad, time_s, axis=0)
     acceleration = np.gradient(rate, time_s, axis=0)
-    later = time_s + _JERK_STEP_S
-    jerk = np.abs(
-        np.stack([np.interp(later, time_s, each) for each in acceleration.T], axis=1) - acceleration
-    )
+    jerk = np.abs(linear(time_s + _JERK_STEP_S, time_s, acceleration) - acceleration)
     largest = np.maximum(jerk.max(axis=0), 1e-12)
     changes = (jerk / largest > _LIMITS.command_share).any(axis=1)
     moving = np.abs(rate) > 1e-3 * np.maximum(np.abs(rate).max(axis=0), 1e-12)
     changes[1:] |= ((np.sign(rate[1:]) * np.sign(rate[:-1]) < 0.0) & moving[1:]).any(axis=1)
-    force = inputs.force_base_N
-    most_N = float(np.linalg.norm(force, axis=1).max(initial=0.0))
-    if most_N > 0.0:
-        next_N = np.stack([np.interp(time_s + _LIMITS.jump_s, time_s, each) for each in force.T], axis=1)
-        changes |= np.linalg.norm(next_N - force, axis=1) > _LIMITS.jump_share * most_N
-    at_s = time_s[changes]
-    after = trace.time_s[:, None] if len(at_s) == 0 else trace.time_s - _last_before(at_s, trace.time_s)
+    changes |= force_jumps(inputs)
+    at_s = np.append(-np.inf, time_s[changes])
+    since_s = trace.time_s - at_s[np.searchsorted(at_s, trace.time_s, side="right") - 1]
     before = np.interp(trace.time_s + _LIMITS.same_place_s, time_s, changes.astype(np.float64)) > 0.0
-    near: Bools = before | (after < _LIMITS.command_lasts_s) if len(at_s) else before
+    near: Bools = before | (since_s < _LIMITS.command_lasts_s)
     return near
-
-
-def _last_before(at_s: Floats, time_s: Floats) -> Floats:
-    """Return the last of some moments before each time (n,); minus infinity where there is none."""
-    number = np.searchsorted(at_s, time_s, side="right")
-    return np.append(-np.inf, at_s)[number]
 
 
 def _repeated(
@@ -508,12 +499,11 @@ def _repeated(
     Rough ones where the others are rough; pulses also where the others do the same, too small to be pulses.
     """
     trace = traces[number]
-    repeats = [i for i, other in enumerate(traces) if i != number and _is_repeat(trace, other)]
+    repeats = [i for i, other in enumerate(traces) if i != number and is_repeat(trace, other)]
     if not repeats:
         return [False] * len(stretches[number])
     others = [
-        _at(trace, [_span(traces[i], each) for each in stretches[i] if not _is_outlier(each)])
-        for i in repeats
+        _at(trace, [each.span(traces[i]) for each in stretches[i] if not each.is_outlier]) for i in repeats
     ]
     everywhere = np.all(others, axis=0)
     # where all are rough most of the time that says nothing
@@ -521,9 +511,8 @@ def _repeated(
         everywhere[:] = False
     again = [linear(trace.time_s, traces[i].time_s, rests[i]) for i in repeats]
     return [
-        not _is_outlier(span)
-        and (bool(everywhere[span.first : span.last].any()) or _is_in_all(span, rests[number], again))
-        for span in stretches[number]
+        not stretch.is_outlier and (stretch.is_in(everywhere) or _is_in_all(stretch, rests[number], again))
+        for stretch in stretches[number]
     ]
 
 
@@ -538,12 +527,6 @@ def _is_in_all(stretch: _Stretch, calm: Floats, again: Sequence[Floats]) -> bool
         values[rows] - (1.0 - share) * values[rows[0]] - share * values[rows[-1]] for values in (calm, *again)
     )
     return all(float(np.sum(here * each)) > 0.5 * float(np.sum(here**2)) for each in others)
-
-
-def _is_repeat(first: Trace, other: Trace) -> bool:
-    a, b = first.inputs, other.inputs
-    same = len(a) == len(b) and first.run != other.run
-    return same and bool(np.allclose(a.position_mm, b.position_mm, atol=_SAME_MM))
 
 
 def _at(trace: Trace, spans: Sequence[Span]) -> Bools:
@@ -569,7 +552,7 @@ def _sorted(
         rows = slice(stretch.first, stretch.last)
         if in_step:
             continue
-        if _is_outlier(stretch):
+        if stretch.is_outlier:
             out[rows], outliers = True, outliers + stretch.last - stretch.first
             continue
         change, has_changed = levels.change(stretch)
@@ -589,18 +572,8 @@ def _sorted(
     )
 
 
-def _is_bursty(traces: Sequence[Trace]) -> bool:
-    """Tell whether a tracker or a force sensor bursts so often that a pulse of it may be a burst, too."""
-    bursts = sum(event.whose is Whose.INSTRUMENT for trace in traces for event in trace.events)
-    return not traces[0].link.of_joints and bursts >= _LIMITS.bursty_least
-
-
-def _of_a_bursty_instrument(trace: Trace) -> Trace:
-    events = (
-        replace(event, whose=Whose.INSTRUMENT) if event.whose is Whose.IMPULSE else event
-        for event in trace.events
-    )
-    return replace(trace, events=tuple(events))
+def _as_burst(event: Event) -> Event:
+    return replace(event, whose=Whose.INSTRUMENT) if event.whose is Whose.IMPULSE else event
 
 
 class _Levels:
@@ -655,3 +628,96 @@ class _Levels:
             self._rest[row : end + 1] if way > 0 else self._rest[min(end, row - 1) if row else 0 : row or 1]
         )
         return np.median(rows, axis=0)
+
+
+# Where it jumps
+
+_JUMPS = THRESHOLDS.noise
+_SMOOTH = 3
+"""Degree of the polynomial that stands for whatever else goes on in a window."""
+_ROUNDING = 1e-12
+"""Share of a component's power below which a sum of squares is that of rounding errors."""
+
+
+def strongest_moments(traces: Sequence[Trace], low_s: float, high_s: float) -> tuple[float, ...]:
+    """Return the moments of the clearest jumps, in s since the earliest run started, the clearest first."""
+    jumps_of_runs = [
+        (jump, trace.inputs.hours * S_PER_H + float(trace.time_s[row]), half_s)
+        for trace in traces
+        for half_s in _JUMPS.jump_halves_s
+        for row, jump in _peaks(trace, half_s)
+    ]
+    moments: list[float] = []
+    for _, at_s, half_s in sorted(jumps_of_runs, reverse=True):
+        apart = all(abs(at_s - other) > half_s for other in moments)
+        if apart and low_s <= at_s <= high_s and len(moments) < _JUMPS.jumps:
+            moments.append(at_s)
+    return tuple(moments)
+
+
+def jump_within(trace: Trace, span_s: Span) -> float | None:
+    """Return the moment within a span at which a residual jumps most clearly; None where it does not.
+
+    All components jump at once, between two stamps: the middle of these is the moment.
+    """
+    time_s = trace.time_s
+    half = max(3, round(_JUMPS.jump_halves_s[0] / usual_step_s(time_s)))
+    first, last = np.searchsorted(time_s, span_s)
+    first, last = max(int(first) - half, 0), min(int(last) + half + 1, len(time_s))
+    if last - first <= 2 * half:
+        return None
+    clear = np.sum([jump_clarity(column, half) for column in _without_clock(trace)[first:last].T], axis=0)
+    row = first + int(np.argmax(clear))
+    return float(time_s[row - 1] + time_s[row]) / 2.0 if clear.max() >= _JUMPS.least_jump else None
+
+
+def _peaks(trace: Trace, half_s: float) -> list[tuple[int, float]]:
+    """Return rows and sizes of the clearest jumps of a trace, not two of them within a window's half."""
+    step_s = usual_step_s(trace.time_s)
+    half = max(3, round(half_s / step_s))
+    if len(trace.time_s) < 2 * half:
+        return []
+    clear = np.sum([jump_clarity(column, half) for column in _without_clock(trace).T], axis=0)
+    peaks: list[tuple[int, float]] = []
+    for row in np.argsort(-clear):
+        if clear[row] < _JUMPS.least_jump or len(peaks) == _JUMPS.jumps:
+            break
+        if all(abs(row - other) > half for other, _ in peaks):
+            peaks.append((int(row), float(clear[row])))
+    return peaks
+
+
+def _without_clock(trace: Trace) -> Floats:
+    """Return the residual (n, k) less what a usual clock or lag of each component takes of it.
+
+    Two milliseconds of a joint that stops at a corner are a jump of many deviations, and no event.
+    """
+    rate = trace.clock_rate - trace.clock_rate.mean(axis=0)
+    late = np.sum(rate * trace.residual, axis=0) / np.maximum(np.sum(rate**2, axis=0), 1e-300)
+    without: Floats = trace.residual - rate * late
+    return without
+
+
+def jump_clarity(values: Floats, half: int) -> Floats:
+    """Return how surprising a jump before each row of (n,) is; 0 within ``half`` rows of the ends."""
+    rows = (np.arange(2 * half) - (half - 0.5)) / half
+    smooth = np.linalg.qr(np.vander(rows, _SMOOTH + 1))[0]
+    jump = np.sign(rows) - smooth @ (smooth.T @ np.sign(rows))
+    jump /= np.linalg.norm(jump)
+    values = values - values.mean()
+    power = _moving(values**2, np.ones(2 * half))
+    explained = sum(_moving(values, each) ** 2 for each in smooth.T)
+    taken = _moving(values, jump)
+    unexplained = np.maximum(power - explained, _ROUNDING * max(float(power.max()), 1e-300))
+    share = np.minimum(taken**2 / unexplained, 1.0 - _ROUNDING)
+    clear = np.zeros(len(values))
+    clear[half : half + len(share)] = -2.0 * half * np.log1p(-share)
+    return clear
+
+
+def _moving(values: Floats, kernel: Floats) -> Floats:
+    """Return the inner product of a kernel with each window of (n,)."""
+    from scipy.signal import fftconvolve
+
+    sums: Floats = fftconvolve(values, kernel[::-1], mode="valid")
+    return sums

@@ -22,6 +22,7 @@ from gcode2krl.effects import arm
 from gcode2krl.effects.inputs import Inputs, gradient
 from gcode2krl.effects.operators import lag, play, second_order, since_reversal
 from gcode2krl.gap.compare.interpolation import linear, nearest_rows
+from gcode2krl.gap.compare.pair import from_base
 from gcode2krl.gap.compare.trace import Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.units import MM_PER_M
@@ -147,14 +148,14 @@ class Admissible:
 
     trace: Trace
 
-    def _at(self, values: Floats) -> Floats:
-        """Return values (m,) or (m, c) of the model's samples at the rows."""
-        wide = values[:, None] if values.ndim == 1 else values
-        at_rows = linear(self.trace.time_s, self.trace.inputs.time_s, wide)
-        return at_rows[:, 0] if values.ndim == 1 else at_rows
+    def at(self, values: Floats) -> Floats:
+        """Return values (m, …) of the model's samples at the rows."""
+        at_rows = linear(self.trace.time_s, self.trace.inputs.time_s, values.reshape(len(values), -1))
+        return at_rows.reshape(-1, *values.shape[1:])
 
     @cached_property
-    def _nearest(self) -> Ints:
+    def nearest(self) -> Ints:
+        """(n,) the samples of the model nearest to the rows."""
         return nearest_rows(self.trace.inputs.time_s, self.trace.time_s)
 
     # Time
@@ -168,14 +169,14 @@ class Admissible:
     @cached_property
     def hours(self) -> Floats:
         """(n,) since the earliest of the runs started."""
-        return self._at(self.trace.inputs.run_hours)
+        return self.at(self.trace.inputs.run_hours)
 
     # Path and process
 
     @cached_property
     def travel_mm(self) -> Floats:
         """(n,) length of the path so far."""
-        return self._at(self.trace.inputs.path_mm)
+        return self.at(self.trace.inputs.path_mm)
 
     @cached_property
     def cut_m(self) -> Floats:
@@ -187,37 +188,33 @@ class Admissible:
         cut_m = np.empty(len(inputs))
         for _, rows in arm.tool_rows(inputs.tool):
             cut_m[rows] = np.cumsum(step_mm[rows]) / MM_PER_M
-        return self._at(cut_m)
+        return self.at(cut_m)
 
     @cached_property
     def position_mm(self) -> Floats:
         """(n, 3) commanded tip."""
-        return self._at(self.trace.inputs.position_mm)
+        return self.at(self.trace.inputs.position_mm)
 
     @cached_property
     def velocity_mm_s(self) -> Floats:
         """(n, 3) of the commanded tip."""
-        return self._at(self.trace.inputs.velocity_mm_s)
+        return self.at(self.trace.inputs.velocity_mm_s)
 
     @cached_property
     def acceleration_mm_s2(self) -> Floats:
         """(n, 3) of the commanded tip."""
         inputs = self.trace.inputs
-        return self._at(gradient(inputs.velocity_mm_s, inputs.time_s))
+        return self.at(gradient(inputs.velocity_mm_s, inputs.time_s))
 
     @cached_property
     def tool_axes(self) -> Floats:
         """(n, 3, 3) rotations of the tool."""
-        return self.trace.inputs.tool_rotation[self._nearest]
-
-    def as_stated(self, vectors: Floats) -> Floats:
-        """Return vectors (n, 3) along ``$BASE`` along the axes in which the signal is stated."""
-        return self.trace.as_stated(vectors, self._nearest)
+        return self.trace.inputs.tool_rotation[self.nearest]
 
     @cached_property
     def force_N(self) -> Floats:
         """(n, 3) the force that bends the arm: the measured one where the model has it."""
-        return self._at(self._force_N)
+        return self.at(self._force_N)
 
     @property
     def presses(self) -> bool:
@@ -231,7 +228,7 @@ class Admissible:
         speed = np.ascontiguousarray(inputs.spindle_rad_s, dtype=float)
         started = np.append(0.0, speed)
         step_s = np.append(inputs.time_s[0] - 1e-3, inputs.time_s)
-        return self._at(np.stack([speed, *(lag(started, step_s, tau)[1:] for tau in _WARMS_S)], axis=1))
+        return self.at(np.stack([speed, *(lag(started, step_s, tau)[1:] for tau in _WARMS_S)], axis=1))
 
     @cached_property
     def _force_N(self) -> Floats:
@@ -242,33 +239,11 @@ class Admissible:
     def temperature_C(self) -> Floats:
         """(n, c) of the places that were logged, the ambient last; (n, 0) without any."""
         logged = self.trace.inputs.temperature_C
-        return np.zeros((len(self.trace.time_s), 0)) if logged is None else self._at(logged)
-
-    # What the controller plans
+        return np.zeros((len(self.trace.time_s), 0)) if logged is None else self.at(logged)
 
     @cached_property
-    def roundings(self) -> Floats:
-        """(n, w, 6) what rounding corners over each of some widths does to the commanded joints."""
-        wide = self._corners.roundings
-        return self._at(wide.reshape(len(wide), -1)).reshape(-1, *wide.shape[1:])
-
-    @cached_property
-    def late_by_rounding(self) -> Floats:
-        """(n, 2) how late larger corners make a run, and corners passed so far."""
-        return self._at(self._corners.late_by_rounding)
-
-    @cached_property
-    def late_by_ramps(self) -> Floats:
-        """(n, 4) speed gained and lost so far, stops so far, acceleration along the path, and speed."""
-        return self._at(self._corners.late_by_ramps)
-
-    @cached_property
-    def corners_passed(self) -> Floats:
-        """(n, c) 1 from each blended corner on."""
-        return self._corners.passed(self._nearest)
-
-    @cached_property
-    def _corners(self) -> Corners:
+    def corners(self) -> Corners:
+        """What the controller plans at corners."""
         return self.trace.inputs.remembered("corners", Corners)
 
     # Joints
@@ -276,24 +251,24 @@ class Admissible:
     @cached_property
     def q_rad(self) -> Floats:
         """(n, 6) commanded joints."""
-        return self._at(self.trace.inputs.q_cmd_rad)
+        return self.at(self.trace.inputs.q_cmd_rad)
 
     @cached_property
     def rate_rad_s(self) -> Floats:
         """(n, 6) velocities of the joints."""
-        return self._at(self.trace.inputs.rate_rad_s)
+        return self.at(self.trace.inputs.rate_rad_s)
 
     @cached_property
     def acceleration_rad_s2(self) -> Floats:
         """(n, 6) accelerations of the joints."""
-        return self._at(gradient(self.trace.inputs.rate_rad_s, self.trace.inputs.time_s))
+        return self.at(gradient(self.trace.inputs.rate_rad_s, self.trace.inputs.time_s))
 
     def jerk(self, joint: int) -> Floats:
         """Return how fast a joint's commanded acceleration changes, (n, c), as servos follow it."""
         inputs = self.trace.inputs
         jerk = gradient(gradient(inputs.rate_rad_s[:, joint], inputs.time_s), inputs.time_s)
         follows = [lag(lag(jerk, inputs.time_s, tau), inputs.time_s, tau) for tau in _FOLLOWS_S]
-        return self._at(np.stack(follows, axis=1))
+        return self.at(np.stack(follows, axis=1))
 
     def rings(self, joint: int) -> Floats:
         """Return how far a joint that hangs at a spring swings from its command (n, c), by its mode."""
@@ -301,26 +276,27 @@ class Admissible:
 
     def swings(self, modes_hz: Sequence[float]) -> Floats:
         """Return the same of what hangs at the tip, along each axis of ``$BASE`` by itself, (k, n, 3·c)."""
-        columns = []
-        for axis, place_mm in zip(np.eye(3), self.trace.inputs.position_mm.T, strict=True):
-            columns += [self.as_stated(own[:, None] * axis) for own in self._swings(place_mm, modes_hz).T]
-        return np.stack(columns, axis=2).swapaxes(0, 1)[list(self.trace.columns)]
+        trace, columns = self.trace, []
+        for axis, place_mm in zip(np.eye(3), trace.inputs.position_mm.T, strict=True):
+            for swing in self._swings(place_mm, modes_hz).T:
+                columns.append(from_base(swing[:, None] * axis, trace.frame, trace.inputs, trace.time_s))
+        return np.stack(columns, axis=2).swapaxes(0, 1)[list(trace.columns)]
 
     def _swings(self, values: Floats, modes_hz: Sequence[float]) -> Floats:
         time_s, values = self.trace.inputs.time_s, np.ascontiguousarray(values)
         follows = [second_order(values, time_s, hz, _RINGS_DAMPING) for hz in modes_hz]
-        return self._at(np.stack(follows, axis=1) - values[:, None])
+        return self.at(np.stack(follows, axis=1) - values[:, None])
 
     @cached_property
     def torque_Nm(self) -> Floats:
         """(n, 6) as logged or, beside a prediction, of all nominal loads: what the gears carry."""
-        return self._at(self._torque)
+        return self.at(self._torque)
 
     @cached_property
     def load_torque_Nm(self) -> Floats:
         """(n, 6) of the force at the tip alone, by the arm's statics: what bends the arm beside its cut."""
         inputs = self.trace.inputs
-        return self._at(arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm))
+        return self.at(arm.torque_Nm(inputs.jacobian, self._force_N, inputs.moment_base_Nmm))
 
     @cached_property
     def _torque(self) -> Floats:
@@ -329,7 +305,7 @@ class Admissible:
 
     def torque_with_memory(self, joint: int) -> Floats:
         """Return what play operators leave of a joint's torque (n, c)."""
-        return self._at(_plays(self._torque[:, joint]))
+        return self.at(_plays(self._torque[:, joint]))
 
     def late(self) -> Floats:
         """Return by how much the signal (k, n, c) differs where it is late: by a time, or as a filter is."""
@@ -350,14 +326,14 @@ class Admissible:
     @cached_property
     def jacobian(self) -> Floats:
         """(n, 3, 6) by how much the tip moves with each joint, mm/rad."""
-        return self.trace.inputs.jacobian[self._nearest, :3]
+        return self.trace.inputs.jacobian[self.nearest, :3]
 
     @cached_property
     def directions(self) -> Floats:
         """(n, 6) of the joints' motion, ±1 with memory."""
         inputs = self.trace.inputs
         directions = [since_reversal(np.ascontiguousarray(q), inputs.time_s)[0] for q in inputs.q_cmd_rad.T]
-        return np.stack(directions, axis=1)[self._nearest]
+        return np.stack(directions, axis=1)[self.nearest]
 
     def reversals(self, joint: int) -> Floats:
         """Return the direction of a joint's motion (n, c) with memory, alone and as play of several widths.
@@ -373,7 +349,7 @@ class Admissible:
         load = np.abs(self._torque[:, joint])
         loaded = direction * load / max(float(load.max(initial=0.0)), 1e-12)
         fades = [direction * np.exp((inputs.time_s[0] - inputs.time_s) / tau) for tau in _WARMS_S]
-        return np.stack([direction, *plays, *settling, loaded, *fades], axis=1)[self._nearest]
+        return np.stack([direction, *plays, *settling, loaded, *fades], axis=1)[self.nearest]
 
     @cached_property
     def drags(self) -> Floats:

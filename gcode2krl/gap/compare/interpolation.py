@@ -125,6 +125,12 @@ def rms_length(vectors: Iterable[Floats]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([np.sum(each**2, axis=1) for each in vectors]))))
 
 
+def hats(values: Floats, knots: Floats) -> Floats:
+    """Return functions (n, k) of values (n,), each 1 at one of evenly spaced knots (k,), 0 at the others."""
+    made: Floats = np.maximum(0.0, 1.0 - np.abs(values[:, None] - knots) / (knots[1] - knots[0]))
+    return made
+
+
 def running_mean(values: Floats, rows: int) -> Floats:
     """Return the mean of ``rows`` neighbours of each row of (n, c), of fewer at the ends."""
     kernel = np.ones(max(rows, 1))

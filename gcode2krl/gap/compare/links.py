@@ -17,8 +17,15 @@ from gcode2krl.effects import Applied, Inputs, Signals, drives, forces, simulate
 from gcode2krl.effects.mismatch import Mismatch, sigma
 from gcode2krl.effects.operators import play
 from gcode2krl.gap.compare.clocks import refined, retimed, with_table_clock
-from gcode2krl.gap.compare.interpolation import cubic, linear, nearest_rows, running_mean, usual_step_s
-from gcode2krl.gap.compare.pair import Pair, usable_rows, with_nominal_joints, with_own_model
+from gcode2krl.gap.compare.interpolation import cubic, hats, linear, nearest_rows, running_mean, usual_step_s
+from gcode2krl.gap.compare.pair import (
+    Pair,
+    axes_of,
+    force_jumps,
+    usable_rows,
+    with_nominal_joints,
+    with_own_model,
+)
 from gcode2krl.gap.compare.trace import Context, FittedVerdict, Link, Trace, Verdict, is_lost, with_rows
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import Controller, Measured
@@ -35,7 +42,7 @@ def _stacked(values: Floats) -> Floats:
     return np.ascontiguousarray(values.T)
 
 
-def constants(trace: "Trace") -> Floats:
+def constants(trace: Trace) -> Floats:
     """Return (k, n, k): column j is one in component j."""
     n, k = trace.shape
     return np.repeat(np.eye(k)[:, None, :], n, axis=1)
@@ -50,7 +57,7 @@ def component_columns(values: Floats) -> Floats:
     return columns
 
 
-def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def play_start_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, k): where in its play each joint stands when the run begins, even between its ends.
 
     Until the play has been crossed once (Krasnosel'skii and Pokrovskii 1989); that it is even is assumed.
@@ -65,16 +72,15 @@ def play_start_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
     return component_columns(begun_rad * sigma(1.0))
 
 
-def force_zero_columns(trace: "Trace") -> Floats:
+def force_zero_columns(trace: Trace) -> Floats:
     """Return a unit force along each axis of the sensor, in the frame of the measured values."""
-    if trace.in_sensor_frame or trace.in_tool_frame:
+    if trace.frame != "base":
         return constants(trace)
-    rows = nearest_rows(trace.inputs.time_s, trace.time_s)
-    turned = trace.inputs.sensor_rotation[rows]
+    turned = axes_of("sensor", trace.inputs, trace.time_s)
     return np.ascontiguousarray(np.moveaxis(turned, 0, 1))
 
 
-def frame_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def frame_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return a shift along and a small turn about each axis of ``$BASE``, about the path's middle."""
     position = trace.nominal
     turned = np.zeros((3, len(position), 6))
@@ -102,17 +108,16 @@ def load_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     return np.stack(columns, axis=2)
 
 
-def clock_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def clock_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, 1): what the clock of the table does to the signal, to first order."""
     return -_stacked(trace.clock_rate)[:, :, None] * sigma(mismatch.clock_s)
 
 
-def time_law_columns(trace: "Trace", mismatch: Mismatch) -> Floats:
+def time_law_columns(trace: Trace, mismatch: Mismatch) -> Floats:
     """Return (k, n, c): the signal's rate times hats over time, for a time law that is slightly off."""
     start, end = trace.time_s[0], trace.time_s[-1]
     knots = np.linspace(start, end, max(2, min(round((end - start) / _KNOTS_S), _MOST_KNOTS) + 1))
-    hats = np.maximum(0.0, 1.0 - np.abs(trace.time_s[:, None] - knots) / (knots[1] - knots[0]))
-    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats[None]
+    columns: Floats = -_stacked(trace.rate)[:, :, None] * hats(trace.time_s, knots)
     return columns * sigma(mismatch.clock_s)
 
 
@@ -122,7 +127,7 @@ JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 
 
 def joint_trace(
-    link: "Link",
+    link: Link,
     pair: Pair,
     table: Controller,
     values: Floats,
@@ -136,28 +141,44 @@ def joint_trace(
 
     ``plus`` less ``minus`` are the signals of the model; ``sigma_rad`` is the stated noise.
     """
-    recorded = np.isfinite(values).all(axis=0) & _moves(table)
+    columns = np.flatnonzero(np.isfinite(values).all(axis=0) & _moves(table)).tolist()
+    names = [JOINTS[column] for column in columns]
+    trace = _trace(link, pair, table, values[:, columns], DEG_PER_RAD, names, columns, plus, base, sigma_rad)
+    return replace(trace, minus=minus) if columns and len(trace.time_s) else None
+
+
+def _trace(
+    link: Link,
+    pair: Pair,
+    table: Measured,
+    values: Floats,
+    factor: float,
+    components: Sequence[str],
+    columns: Sequence[int],
+    plus: str,
+    base: Sequence[Applied],
+    sigma: float | None,
+) -> Trace:
+    """Return the usable rows of values (n, k) of a table."""
     stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
-    if not recorded.any() or len(rows) == 0:
-        return None
-    columns = tuple(np.flatnonzero(recorded).tolist())
+    # a log alone may begin in motion: near to its ends its model is not known
+    ends_s = _LIMITS.log_ends_s if pair.from_log and not pair.still else 0.0
+    rows, segments = usable_rows(table, stamps, pair.inputs, ends_s)
     return Trace(
         link=link,
         run=pair.name,
         run_number=pair.number,
-        factor=DEG_PER_RAD,
-        components=tuple(JOINTS[column] for column in columns),
-        columns=columns,
+        factor=factor,
+        components=tuple(components),
+        columns=tuple(columns),
         plus=plus,
-        minus=minus,
         inputs=pair.inputs,
         simulator=pair.simulator,
         base=tuple(base),
         time_s=stamps[rows],
-        measured=values[np.ix_(rows, np.array(columns))],
+        measured=values[rows],
         segments=segments,
-        declared_sigma=sigma_rad,
+        declared_sigma=sigma,
     )
 
 
@@ -171,7 +192,7 @@ def _moves(table: Controller) -> Bools:
 
 
 def vector_trace(
-    link: "Link",
+    link: Link,
     pair: Pair,
     table: Measured,
     values: Floats,
@@ -185,28 +206,9 @@ def vector_trace(
 
     ``plus`` is the signal of the model; ``sigma`` is the stated noise.
     """
-    stamps = pair.stamps(table)
-    rows, segments = usable_rows(table, stamps, pair.inputs, _ends_s(pair))
-    trace = Trace(
-        link=link,
-        run=pair.name,
-        run_number=pair.number,
-        factor=1.0,
-        components=("x", "y", "z"),
-        columns=(0, 1, 2),
-        plus=plus,
-        inputs=pair.inputs,
-        simulator=pair.simulator,
-        base=tuple(base),
-        time_s=stamps[rows],
-        measured=values[rows],
-        segments=segments,
-        declared_sigma=sigma,
-        in_sensor_frame=frame == "sensor",
-        in_tool_frame=frame == "tcp",
-        still=pair.still,
-    )
-    return with_rows(trace, ~at_edges(pair.inputs, trace.time_s))
+    trace = _trace(link, pair, table, values, 1.0, "xyz", range(3), plus, base, sigma)
+    trace = with_rows(trace, ~at_edges(pair.inputs, trace.time_s))
+    return replace(trace, frame=frame, still=pair.still)
 
 
 def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
@@ -214,25 +216,12 @@ def at_edges(inputs: Inputs, time_s: Floats) -> Bools:
 
     Removal finds an edge of the cut to a sample; within it the force is right or wrong by all of itself.
     """
-    force = inputs.force_base_N
-    largest = float(np.linalg.norm(force, axis=1).max(initial=0.0))
-    if largest == 0.0:
-        return np.zeros(len(time_s), dtype=np.bool_)
-    own_s = inputs.time_s
-    later = np.stack([np.interp(own_s + _LIMITS.jump_s, own_s, column) for column in force.T], axis=1)
-    jumps = own_s[np.linalg.norm(later - force, axis=1) > _LIMITS.jump_share * largest] + _LIMITS.jump_s / 2.0
-    if len(jumps) == 0:
-        return np.zeros(len(time_s), dtype=np.bool_)
-    after = np.clip(np.searchsorted(jumps, time_s), 1, len(jumps) - 1) if len(jumps) > 1 else 0
-    before = np.maximum(after - 1, 0)
-    nearest = np.minimum(np.abs(time_s - jumps[after]), np.abs(time_s - jumps[before]))
+    jumps = inputs.time_s[force_jumps(inputs)] + _LIMITS.jump_s / 2.0
+    jumps = np.concatenate([[-np.inf], jumps, [np.inf]])
+    after = np.searchsorted(jumps, time_s)
+    nearest = np.minimum(jumps[after] - time_s, time_s - jumps[after - 1])
     near: Bools = nearest < _LIMITS.jump_left_out_s
     return near
-
-
-def _ends_s(pair: Pair) -> float:
-    """Return how near to the ends of its model a row is left out: a log alone may begin in motion."""
-    return _LIMITS.log_ends_s if pair.from_log and not pair.still else 0.0
 
 
 class TimingLink(Link):
@@ -436,7 +425,7 @@ def _with_free_controller(context: Context, servo: Verdict) -> Context:
 def _clock(judged: Verdict | None, target: str) -> Applied | None:
     """Return the named clock of a table or of columns."""
     named = judged.applied if judged is not None else ()
-    return next((one for one in named if one.effect.is_clock and one.target == target), None)
+    return next((applied for applied in named if applied.effect.is_clock and applied.target == target), None)
 
 
 def _offset_s(clock: Applied) -> float:
@@ -599,40 +588,33 @@ class SurfaceLink(Link):
 
     def points(self, pair: Pair, base: Sequence[Applied] = ()) -> SurfacePoints | None:
         """Return the scanned points of a run with a prediction; None without a scan or if the tool turns."""
-        if not pair.known_robot or pair.from_log:
+        scan, inputs = pair.run.scan, pair.inputs
+        if scan is None or not pair.known_robot or pair.from_log:
             return None
-        return _assigned(pair, base)
-
-
-def _assigned(pair: Pair, base: Sequence[Applied]) -> SurfacePoints | None:
-    """Return the points of a run's scan beside the surface that its tip has swept."""
-    scan, inputs = pair.run.scan, pair.inputs
-    axis = inputs.tool_rotation[:, :, 2]
-    cuts: Bools = np.any(inputs.force_base_N, axis=1)
-    if scan is None or not cuts.any() or np.ptp(axis, axis=0).max() > _LIMITS.scan_straight:
-        return None
-    turn = _upright(-axis[0] if axis[0, 2] < 0.0 else axis[0])
-    tip, bent = (values[cuts] @ turn.T for values in _tips(pair, base))
-    radius, corner = _cutters(inputs, cuts)
-    points = scan.position_mm @ turn.T
-    feet = [_foot(point, tip, radius, corner) for point in points]
-    kept = [foot for foot in feet if foot is not None]
-    if len(kept) < _LIMITS.scan_least_points:
-        return None
-    normal = np.array([foot.normal for foot in kept])
-    return SurfacePoints(
-        deviation=np.array([foot.deviation for foot in kept]),
-        wall=np.array([foot.is_wall for foot in kept]),
-        normal=normal,
-        deflection=np.sum(bent[[foot.row for foot in kept]] * normal, axis=1),
-        place=points[[foot is not None for foot in feet]],
-    )
-
-
-def _cutters(inputs: Inputs, cuts: Bools) -> tuple[Floats, Floats]:
-    """Return the radius and the height of the corner of the cutter at each cutting sample."""
-    tools = [inputs.cell.tool[int(number)] for number in inputs.tool[cuts]]
-    return np.array([tool.diameter_mm / 2.0 for tool in tools]), np.array([_corner(tool) for tool in tools])
+        axis = inputs.tool_rotation[:, :, 2]
+        cuts: Bools = np.any(inputs.force_base_N, axis=1)
+        if not cuts.any() or np.ptp(axis, axis=0).max() > _LIMITS.scan_straight:
+            return None
+        turn = _upright(-axis[0] if axis[0, 2] < 0.0 else axis[0])
+        tip, bent = (values[cuts] @ turn.T for values in _tips(pair, base))
+        tools = [inputs.cell.tool[int(number)] for number in inputs.tool[cuts]]
+        radius = np.array([tool.diameter_mm / 2.0 for tool in tools])
+        # heights above the tip from which the cutters have their whole radius
+        corner = np.array([tool.corner_radius_mm for tool in tools])
+        corner = np.where([tool.kind == "ball" for tool in tools], radius, corner)
+        points = scan.position_mm @ turn.T
+        feet = [_foot(point, tip, radius, corner) for point in points]
+        kept = [foot for foot in feet if foot is not None]
+        if len(kept) < _LIMITS.scan_least_points:
+            return None
+        normal = np.array([foot.normal for foot in kept])
+        return SurfacePoints(
+            deviation=np.array([foot.deviation for foot in kept]),
+            wall=np.array([foot.is_wall for foot in kept]),
+            normal=normal,
+            deflection=np.sum(bent[[foot.row for foot in kept]] * normal, axis=1),
+            place=points[[foot is not None for foot in feet]],
+        )
 
 
 class _Foot(NamedTuple):
@@ -675,12 +657,6 @@ def _tips(pair: Pair, base: Sequence[Applied]) -> tuple[Floats, Floats]:
     offset = table.position_mm - linear(own_s, inputs.time_s, tip)
     smooth = running_mean(offset, round(_LIMITS.scan_smooth_s / usual_step_s(own_s)))
     return tip + linear(inputs.time_s, own_s, smooth), np.zeros_like(bent)
-
-
-def _corner(tool: object) -> float:
-    """Return the height above the tip from which a cutter has its whole radius."""
-    kind, diameter = getattr(tool, "kind", "flat"), float(getattr(tool, "diameter_mm", 0.0))
-    return diameter / 2.0 if kind == "ball" else float(getattr(tool, "corner_radius_mm", 0.0))
 
 
 def _upright(up: Floats) -> Floats:

@@ -17,9 +17,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from gcode2krl import frames as fr
 from gcode2krl import robot
-from gcode2krl.arrays import Floats, Ints
+from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.blockwise import plan_course
 from gcode2krl.cell import Cell, load_cell
 from gcode2krl.cell.carried import require_still
@@ -84,8 +83,6 @@ def remembered_plan(prediction: Prediction) -> RememberedPlan | None:
 
     Joint speed limits cost more than the rest of a plan together; they are left out where none was met.
     """
-    from gcode2krl.effects.apply import inputs_of
-
     dt_s = float(prediction.inputs.get("dt_s", prediction.cell.controller.cycle_s))
     if any(issue.code == "joint-speed" for issue in prediction.issues):
         return RememberedPlan(partial(plan_motion, watches=False), dt_s)
@@ -166,16 +163,12 @@ def temperature_at(table: Controller | Poses | None, time_s: Floats) -> Floats |
         return None
     logged = [each for each in (table.temperature_C, table.ambient_C) if each is not None]
     columns = [column for each in logged for column in each.T if np.isfinite(column).any()]
-    if not columns:
-        return None
     known = [np.isfinite(column) for column in columns]
-    return np.stack(
-        [
-            np.interp(time_s, table.time_s[rows], column[rows])
-            for column, rows in zip(columns, known, strict=True)
-        ],
-        axis=1,
-    )
+    filled = [
+        np.interp(time_s, table.time_s[rows], column[rows])
+        for column, rows in zip(columns, known, strict=True)
+    ]
+    return np.stack(filled, axis=1) if filled else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -231,11 +224,8 @@ class Pair:
         table, inputs = self.run.force, self.inputs
         if table is None or inputs.forces is None:
             return self
-        own_s, force_N = self.stamps(table), table.force_N
-        frame = self.run.head.frames.force
-        if frame in ("sensor", "tcp"):
-            turn = inputs.sensor_rotation if frame == "sensor" else inputs.tool_rotation
-            force_N = np.einsum("nij,nj->ni", turn[nearest_rows(inputs.time_s, own_s)], force_N)
+        own_s = self.stamps(table)
+        force_N = in_base(table.force_N, self.run.head.frames.force, inputs, own_s)
         rows = round(_LIMITS.load_smooth_s / usual_step_s(own_s))
         seen = simulate(inputs, applied).force_meas_base_N if applied else inputs.force_base_N
         bending = simulate(inputs, base).force_base_N if base else inputs.force_base_N
@@ -294,21 +284,47 @@ class Pair:
         return apart
 
 
+def axes_of(frame: str, inputs: Inputs, times_s: Floats) -> Floats:
+    """Return the rotations (n, 3, 3) in ``$BASE`` of a frame, tcp or sensor, at some times."""
+    turn = inputs.sensor_rotation if frame == "sensor" else inputs.tool_rotation
+    return turn[nearest_rows(inputs.time_s, times_s)]
+
+
+def in_base(vectors: Floats, frame: str, inputs: Inputs, times_s: Floats) -> Floats:
+    """Return vectors (n, 3) along the axes of a frame, at some times, along those of ``$BASE``."""
+    if frame == "base":
+        return vectors
+    turned: Floats = np.einsum("nij,nj->ni", axes_of(frame, inputs, times_s), vectors)
+    return turned
+
+
+def from_base(vectors: Floats, frame: str, inputs: Inputs, times_s: Floats) -> Floats:
+    """Return vectors (n, 3) along ``$BASE``, at some times, along the axes of a frame."""
+    if frame == "base":
+        return vectors
+    turned: Floats = np.einsum("nji,nj->ni", axes_of(frame, inputs, times_s), vectors)
+    return turned
+
+
+def force_jumps(inputs: Inputs) -> Bools:
+    """Return at which samples (m,) the predicted force is about to jump."""
+    if not inputs.force_base_N.any():
+        return np.zeros(len(inputs), dtype=np.bool_)
+    later_N = linear(inputs.time_s + _LIMITS.jump_s, inputs.time_s, inputs.force_base_N)
+    largest_N = float(np.linalg.norm(inputs.force_base_N, axis=1).max(initial=0.0))
+    jumps: Bools = np.linalg.norm(later_N - inputs.force_base_N, axis=1) > _LIMITS.jump_share * largest_N
+    return jumps
+
+
 def usable_rows(table: Measured, stamps: Floats, inputs: Inputs, ends_s: float = 0.0) -> tuple[Ints, Ints]:
     """Return the rows (n,) of a table within the model's time, and their segments (s, 2).
 
     ``ends_s``: so near to its ends a row is left out; a model that begins in motion is not known before.
     """
     first, last = inputs.time_s[0] + ends_s, inputs.time_s[-1] - ends_s
-    inside = (stamps >= first) & (stamps <= last)
-    rows = np.flatnonzero(inside)
-    edges = []
-    for start, end in table.segments:
-        within = np.searchsorted(rows, [start, end])
-        if within[1] > within[0]:
-            edges.append(within)
-    segments = np.array(edges, dtype=np.int64).reshape(-1, 2)
-    return rows, segments
+    rows = np.flatnonzero((stamps >= first) & (stamps <= last))
+    segments: Ints = np.searchsorted(rows, table.segments).reshape(-1, 2)
+    return rows, segments[segments[:, 1] > segments[:, 0]]
 
 
 def is_of_poses(run: Run) -> bool:
@@ -521,11 +537,7 @@ def _inputs(run: Run, cell: Cell, hours: float, known_robot: bool) -> Inputs | N
     inputs = _unplanned(cell, time_s, q, is_placed)
     if is_placed and run.force is not None:
         force_N = linear(time_s, run.force.time_s, run.force.force_N)
-        if run.head.frames.force != "base":
-            turned = fr.rotation_from_quaternion(inputs.rotation)
-            if run.head.frames.force == "sensor":
-                turned = turned @ cell.tool_matrix(cell.usual_tool or 1)[:3, :3].T
-            force_N = np.einsum("nij,nj->ni", turned, force_N)
+        force_N = in_base(force_N, run.head.frames.force, inputs, time_s)
         inputs = replace(inputs, force_base_N=force_N)
     torque_Nm = _torque_Nm(table)
     return replace(

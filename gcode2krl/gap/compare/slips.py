@@ -27,9 +27,9 @@ from gcode2krl.effects.builtin.advance_stop import with_stops
 from gcode2krl.errors import Gcode2KrlError, Issue
 from gcode2krl.gap.compare.clocks import gone, with_table_clock
 from gcode2krl.gap.compare.inputs import rows_of_passing
-from gcode2krl.gap.compare.interpolation import rms_length, usual_step_s
+from gcode2krl.gap.compare.interpolation import length_along, rms, rms_length, usual_step_s
 from gcode2krl.gap.compare.links import FORCE, MECHANICS, PATH
-from gcode2krl.gap.compare.pair import Pair, Simulator
+from gcode2krl.gap.compare.pair import Pair
 from gcode2krl.gap.compare.trace import Link, Trace
 from gcode2krl.gap.thresholds import THRESHOLDS
 from gcode2krl.runs import check_against
@@ -72,8 +72,7 @@ class CommandedPath:
     @cached_property
     def gone_mm(self) -> Floats:
         """(n,) way up to each sample."""
-        steps = np.linalg.norm(np.diff(self.tip_mm, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return length_along(self.tip_mm)
 
 
 def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:
@@ -96,15 +95,8 @@ def commanded_path(pair: Pair, tool: int | None = None) -> CommandedPath | None:
     rows = rows[_of_the_program(tip_mm[rows], apart_mm[rows], inputs)]
     if len(rows) < 2:
         return None
-    return CommandedPath(
-        pair.name,
-        inputs,
-        pair.stamps(table)[rows],
-        tip_mm[rows],
-        way_mm[rows],
-        apart_mm[rows],
-        resolution_mm,
-    )
+    of_rows = pair.stamps(table)[rows], tip_mm[rows], way_mm[rows], apart_mm[rows]
+    return CommandedPath(pair.name, inputs, *of_rows, resolution_mm)
 
 
 def _nearest_tool(q_rad: Floats, inputs: Inputs, tool: int | None) -> tuple[Floats, Floats]:
@@ -214,9 +206,8 @@ class Slip:
 def motion_traces(pairs: Sequence[Pair]) -> list[Trace]:
     """Return what shows how far the runs have come: their joints, or without any their tips."""
     joints = [trace for pair in pairs if (trace := PATH.motion(pair)) is not None]
-    return [
-        trace for trace in joints if len(trace.time_s) >= THRESHOLDS.compare.trace_least_rows
-    ] or MECHANICS.traces(pairs)
+    long = [trace for trace in joints if len(trace.time_s) >= _LIMITS.trace_least_rows]
+    return long or MECHANICS.traces(pairs)
 
 
 def rms_left(traces: Sequence[Trace], applied: Applied) -> float:
@@ -245,17 +236,16 @@ def best_of(traces: Sequence[Trace], candidates: Sequence[Applied]) -> tuple[App
 def slip_if_explained(traces: Sequence[Trace], applied: Applied, after: float, words: str) -> list[Slip]:
     """Return the slip where it takes nine tenths of the gap's power; ``after`` is the rms that it leaves."""
     before = rms_before(traces)
-    if after**2 > (1.0 - THRESHOLDS.compare.explained_share) * before**2:
+    if after**2 > (1.0 - _LIMITS.explained_share) * before**2:
         return []
-    trace = traces[0]
-    factor = trace.factor
-    return [Slip(applied, trace.link, before * factor, after * factor, trace.unit, words)]
+    link, factor = traces[0].link, traces[0].factor
+    return [Slip(applied, link, before * factor, after * factor, link.unit, words)]
 
 
 def final_slip(effect: Effect, target: str | None, words: str, pairs: Sequence[Pair]) -> Slip:
     """Return a slip beyond which nothing is compared."""
     traces = motion_traces(pairs)
-    factor, unit = (traces[0].factor, traces[0].unit) if traces else (1.0, "mm")
+    factor, unit = (traces[0].factor, traces[0].link.unit) if traces else (1.0, "mm")
     before = rms_before(traces) if traces else 0.0
     values = {p.name: p.start if p.nominal is None else p.nominal for p in effect.parameters}
     return Slip(Applied(effect, target, values), PATH, before * factor, None, unit, words, final=True)
@@ -309,10 +299,10 @@ def _clock_of(link: Link, pairs: Sequence[Pair], effect: Effect) -> Slip | None:
     on_time, off = link.traces(pairs), link.traces(as_stamped)
     if not on_time or not off:
         return None
-    factor, unit = on_time[0].factor, on_time[0].unit
+    before, after = (on_time[0].factor * rms_before(traces) for traces in (off, on_time))
     applied = Applied(effect, table, {"offset_s": offset_s, "skew": 0.0})
     words = f"the clock of {table} is {offset_s:+.3f} s off the prediction's"
-    return Slip(applied, link, rms_before(off) * factor, rms_before(on_time) * factor, unit, words)
+    return Slip(applied, link, before, after, link.unit, words)
 
 
 _FORCE_UNIT = "unit"
@@ -334,7 +324,7 @@ def force_unit_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> lis
     power = sum(float(np.sum(trace.nominal**2)) for trace in traces)
     factor = max(sum(float(np.sum(trace.nominal * trace.measured)) for trace in traces) / power, 1e-12)
     unit = min(_UNITS, key=lambda known: abs(log(factor / known)))
-    if abs(log(factor / unit)) > THRESHOLDS.compare.force_unit_log:
+    if abs(log(factor / unit)) > _LIMITS.force_unit_log:
         return []
     applied = Applied(effect, "force", {"factor": unit})
     words = f"force.csv is {unit:g} times the predicted force: {_UNITS[unit]} in place of newtons"
@@ -344,45 +334,35 @@ def force_unit_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> lis
 def without_cuts(pairs: Iterable[Pair]) -> tuple[list[Pair], list[Issue]]:
     """Return the pairs, those in air without forces; a warning for each that nobody stated."""
     pairs_in_air, issues = [], []
-    simulators: dict[Simulator, Simulator] = {}
     for pair in pairs:
-        stated = pair.run.head.in_air
-        if stated is False or not pair.inputs.force_base_N.any():
+        stated, nothing = pair.run.head.in_air, np.zeros_like(pair.inputs.force_base_N)
+        inputs = replace(pair.inputs, force_base_N=nothing, moment_base_Nmm=nothing, forces=None, cut=None)
+        in_air = replace(pair, inputs=inputs)
+        cuts = stated is False or not pair.inputs.force_base_N.any()
+        if cuts or not (stated or _is_nearer(pair, in_air)):
             pairs_in_air.append(pair)
             continue
-        in_air = _in_air(pair, simulators.setdefault(pair.simulator, Simulator()))
-        if stated or _is_nearer(pair, in_air):
-            pairs_in_air.append(in_air)
-            if not stated:
-                words = (
-                    f"{pair.name}: the tip shows nothing of the predicted deflection: taken as a run in air"
-                )
-                remedy = "in_air = true in run.toml; false where something was cut"
-                issues.append(Issue("warning", "run-in-air", 0, words, remedy))
-        else:
-            pairs_in_air.append(pair)
+        pairs_in_air.append(in_air)
+        if not stated:
+            words = f"{pair.name}: the tip shows nothing of the predicted deflection: taken as a run in air"
+            remedy = "in_air = true in run.toml; false where something was cut"
+            issues.append(Issue("warning", "run-in-air", 0, words, remedy))
     return pairs_in_air, issues
-
-
-def _in_air(pair: Pair, simulator: Simulator) -> Pair:
-    nothing = np.zeros_like(pair.inputs.force_base_N)
-    inputs = replace(pair.inputs, force_base_N=nothing, moment_base_Nmm=nothing, forces=None, cut=None)
-    return replace(pair, inputs=inputs, simulator=simulator)
 
 
 def _is_nearer(pair: Pair, in_air: Pair) -> bool:
     """Tell whether the tip is nearer to the model without forces from the first cut to the last."""
     traces, bare = MECHANICS.traces([pair]), MECHANICS.traces([in_air])
-    if not traces or not bare or traces[0].in_sensor_frame or traces[0].in_tool_frame:
+    if not traces or not bare or traces[0].frame != "base":
         return False
     _, rows, bare_rows = np.intersect1d(traces[0].time_s, bare[0].time_s, return_indices=True)
     cutting, air = traces[0].residual[rows], bare[0].residual[bare_rows]
     bent_mm = np.linalg.norm(traces[0].nominal[rows] - bare[0].nominal[bare_rows], axis=1)
     is_bent = bent_mm > 0.5 * bent_mm.max(initial=0.0)
-    if is_bent.sum() < THRESHOLDS.compare.trace_least_rows:
+    if is_bent.sum() < _LIMITS.trace_least_rows:
         return False
     quarters = zip(np.array_split(cutting[is_bent], 4), np.array_split(air[is_bent], 4), strict=True)
-    return all(rms_length([own]) < _LIMITS.air_share * rms_length([other]) for other, own in quarters)
+    return all(rms_length([bare]) < _LIMITS.air_share * rms_length([bent]) for bent, bare in quarters)
 
 
 _OVERRIDE = "override"
@@ -399,8 +379,7 @@ def override_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[
     traces = motion_traces(pairs)
     if not traces:
         return []
-    percent = float(np.median(percents))
-    tried = percent * np.array(_LIMITS.override_first_tries)
+    tried = float(np.median(percents)) * np.array(_LIMITS.override_first_tries)
     best, after = best_of(traces, [Applied(effect, None, {"percent": float(each)}) for each in tried])
     for width in _LIMITS.override_widths:
         around = best.values["percent"] * (1.0 + width * np.array([-0.5, 0.0, 0.5, -1.0, 1.0]))
@@ -444,8 +423,8 @@ def unplanned_stops(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> tup
     plannable = all("plan" in pair.inputs.offers for pair in pairs)
     if effect is None or not plannable or len(traces) < len(pairs):
         return [], unchanged
-    before = _rms(traces)
-    if before < traces[0].link.least_off:
+    before, link, factor = _rms(traces), traces[0].link, traces[0].factor
+    if before < link.least_off:
         return [], unchanged
     stops = _explaining_stops(pairs, before)
     if stops is None:
@@ -456,8 +435,7 @@ def unplanned_stops(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> tup
         {int(line) for pair, rows in zip(pairs, stops.rows, strict=True) for line in _lines(pair, rows)}
     )
     words = f"the robot stopped exactly at {count} corners that are blended in the plan, lines {lines}"
-    factor, unit = traces[0].factor, traces[0].unit
-    slip = Slip(applied, traces[0].link, before * factor, stops.rms_left * factor, unit, words)
+    slip = Slip(applied, link, before * factor, stops.rms_left * factor, link.unit, words)
     return [slip], stops.pairs
 
 
@@ -500,7 +478,10 @@ def _held(pairs: Sequence[Pair], stops: Sequence[Ints]) -> tuple[float, list[Pai
     """Return how long (s) the robot stands at each stop, and the pairs with the stops planned."""
     hold_s, stopped = 0.0, list(pairs)
     for _ in range(_LIMITS.stop_hold_steps):
-        stopped = [_stopped(pair, rows, hold_s) for pair, rows in zip(pairs, stops, strict=True)]
+        stopped = [
+            replace(pair, inputs=with_stops(pair.inputs, rows, hold_s)) if len(rows) else pair
+            for pair, rows in zip(pairs, stops, strict=True)
+        ]
         left_s = [
             _lateness(planned, corners := _corners(pair))[np.isin(corners, rows)]
             for pair, planned, rows in zip(pairs, stopped, stops, strict=True)
@@ -548,12 +529,6 @@ def _lateness(pair: Pair, corners: Ints) -> Floats:
     return np.diff(late[1:])
 
 
-def _stopped(pair: Pair, rows: Ints, hold_s: float) -> Pair:
-    """Return the pair with stops at some targets in its plan."""
-    inputs: Inputs = with_stops(pair.inputs, rows, hold_s) if len(rows) else pair.inputs
-    return replace(pair, inputs=inputs)
-
-
 def _on_time(pair: Pair) -> Pair:
     """Return the pair with the clock of its table as it fits best."""
     return with_table_clock(pair, PATH if PATH.traces([pair]) else MECHANICS)
@@ -570,7 +545,7 @@ def _lines(pair: Pair, rows: Ints) -> Ints:
 
 def _rms(traces: Sequence[Trace]) -> float:
     """Return the rms of the gap's components."""
-    return float(np.sqrt(np.mean(np.concatenate([trace.residual.ravel() ** 2 for trace in traces]))))
+    return rms(np.concatenate([trace.residual.ravel() for trace in traces]))
 
 
 def other_feeds(paths: Sequence[CommandedPath]) -> str | None:
@@ -606,11 +581,9 @@ def _ratios(path: CommandedPath) -> Iterator[tuple[float, bool]]:
     planned_mm = np.concatenate([[0.0], np.cumsum(steps)])
     length_mm = path.gone_mm[-1]
     same = path.share(path.apart_mm <= path.off_mm) >= _LIMITS.feed_same_curve and planned_mm[-1] > 0.0
-    if (
-        inputs.toolpath is None
-        or not same
-        or abs(length_mm / planned_mm[-1] - 1.0) > _LIMITS.feed_same_length
-    ):
+    if inputs.toolpath is None or not same:
+        return
+    if abs(length_mm / planned_mm[-1] - 1.0) > _LIMITS.feed_same_length:
         return
     gone_mm = path.gone_mm * (planned_mm[-1] / length_mm)
     for start, end in _steady(steps, inputs):

@@ -28,7 +28,7 @@ from gcode2krl.gap.compare.interpolation import (
     usual_step_s,
     values_of,
 )
-from gcode2krl.gap.compare.pair import Pair, Simulator
+from gcode2krl.gap.compare.pair import Pair, Simulator, from_base
 from gcode2krl.gap.thresholds import THRESHOLDS
 
 _LIMITS = THRESHOLDS.compare
@@ -133,10 +133,8 @@ class Link:
 
     def traces(self, pairs: Iterable[Pair], base: Sequence[Applied] = ()) -> "list[Trace]":
         """Return the measured signals, one a run that has it and is long enough to be judged."""
-        traces = [self.trace(pair, base) for pair in pairs]
-        return [
-            trace for trace in traces if trace is not None and len(trace.time_s) >= _LIMITS.trace_least_rows
-        ]
+        traces = (self.trace(pair, base) for pair in pairs)
+        return [trace for trace in traces if trace and len(trace.time_s) >= _LIMITS.trace_least_rows]
 
     def base(self, context: "Context") -> tuple[Applied, ...]:
         """Return the effects that are part of its model from the start."""
@@ -194,9 +192,8 @@ class Trace:
     clock_set_s: float = 0.0
     """What was taken off the stamps for the run's own clock."""
     declared_sigma: float | None = None
-    in_sensor_frame: bool = False
-    """The values are along the sensor's axes, which are those of the flange."""
-    in_tool_frame: bool = False
+    frame: str = "base"
+    """Along the axes of which a vector is: base, tcp or sensor, whose axes are those of the flange."""
     still: bool = False
     """Each row is a pose in which the robot stands."""
     left_out: tuple[str, ...] = ()
@@ -210,11 +207,6 @@ class Trace:
     def signal(self) -> str:
         """Return the name in the report: tcp, force, joint_load …"""
         return self.link.signal
-
-    @property
-    def unit(self) -> str:
-        """Return the unit of the report."""
-        return self.link.unit
 
     @property
     def of_six_encoders(self) -> bool:
@@ -271,13 +263,13 @@ class Trace:
         kinks = np.zeros_like(values)
         kinks[2:-2] = np.abs(jumps[1:-1] - 0.5 * (jumps[:-2] + jumps[2:]))
         near = np.maximum(kinks, np.maximum(np.roll(kinks, 1, axis=0), np.roll(kinks, -1, axis=0)))
-        if self.in_sensor_frame or self.in_tool_frame:  # whichever way they are turned
+        if self.frame != "base":  # whichever way they are turned
             near = np.repeat(np.linalg.norm(near, axis=1, keepdims=True), near.shape[1], axis=1)
         return near[nearest_rows(own_s, self.time_s - self.plus_late_s)][:, list(self.columns)]
 
     @cached_property
     def _plain(self) -> Signals:
-        return self._simulated(self.base)
+        return self.signals(())
 
     @cached_property
     def _last_paths(self) -> tuple[LastPath, LastPath]:
@@ -288,15 +280,9 @@ class Trace:
         """Return what the model says (n, k) of an instrument that states what was true some time before."""
         return self.at(self._plain, self.time_s - by_s)
 
-    def as_stated(self, vectors: Floats, rows: Ints) -> Floats:
-        """Return vectors (n, 3) along ``$BASE``, at these rows (n,) of the model, along the signal's axes."""
-        return self._turned(self.inputs, vectors, rows)
-
     def sample(self, applied: Sequence[Applied]) -> Floats:
         """Return what the instrument would show (n, k) with these effects at work besides the base."""
-        if not applied:
-            return self.at(self._plain, self.time_s)
-        return self.at(self._simulated((*self.base, *applied)), self.time_s)
+        return self.at(self.signals(applied) if applied else self._plain, self.time_s)
 
     def model_error(self, applied: Sequence[Applied]) -> Floats:
         """Return by how much the model may be off (n, k) where it, not noise, is the limit.
@@ -313,20 +299,16 @@ class Trace:
 
     def signals(self, applied: Sequence[Applied]) -> Signals:
         """Return all signals of the model with these effects at work besides the base."""
-        return self._simulated((*self.base, *applied))
-
-    def _simulated(self, applied: tuple[Applied, ...]) -> Signals:
-        return self.link.simulated(self, applied)
+        return self.link.simulated(self, (*self.base, *applied))
 
     def at(self, signals: Signals, stamps: Floats) -> Floats:
         """Return what the instrument would show (n, k) of simulated signals at its stamps (n,)."""
         times = signals.true_time(self.plus, stamps - self.plus_late_s)
-        if self.minus is not None:
-            # the inputs are this signal as it was stamped: a clock of its own shows in the other one
-            times = times - signals.own_late_s(self.minus, stamps)
         if self.minus is None:
             values = interpolate(signals, self.plus, times, self._last_paths[0])
         else:
+            # the inputs are this signal as it was stamped: a clock of its own shows in the other one
+            times = times - signals.own_late_s(self.minus, stamps)
             other = signals.table_time(self.minus, stamps)
             if np.array_equal(times, other):
                 apart = values_of(signals, self.plus) - values_of(signals, self.minus)
@@ -335,16 +317,8 @@ class Trace:
                 plus, minus = self._last_paths
                 values = interpolate(signals, self.plus, times, plus)
                 values = values - interpolate(signals, self.minus, other, minus)
-        if self.in_sensor_frame or self.in_tool_frame:
-            values = self._turned(signals.inputs, values, nearest_rows(signals.inputs.time_s, times))
+        values = from_base(values, self.frame, signals.inputs, times)
         return values[:, list(self.columns)]
-
-    def _turned(self, inputs: Inputs, values: Floats, rows: Ints) -> Floats:
-        if not (self.in_sensor_frame or self.in_tool_frame):
-            return values
-        rotation = inputs.sensor_rotation if self.in_sensor_frame else inputs.tool_rotation
-        turned: Floats = np.einsum("nji,nj->ni", rotation[rows], values)
-        return turned
 
 
 STRETCH_S = THRESHOLDS.compare.stretch_s
@@ -468,6 +442,21 @@ def _with_guards(time_s: Floats, inside: Bools) -> Bools:
     first, last = time_s[inside][[0, -1]]
     guarded: Bools = (time_s >= first - STRETCH_S) & (time_s <= last + STRETCH_S)
     return guarded
+
+
+_SAME_MM = 1e-3
+_SAME_RAD = 1e-3
+"""Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
+
+
+def is_repeat(trace: Trace, other: Trace) -> bool:
+    """Tell whether two traces are of one program, so that they can be compared row by row."""
+    a, b = trace.inputs, other.inputs
+    if len(a) != len(b) or trace.shape[1] != other.shape[1]:
+        return False
+    # with relative angles every tip is zero, and the joints tell the programs apart
+    tips = np.allclose(a.position_mm, b.position_mm, atol=_SAME_MM)
+    return tips and np.allclose(a.q_cmd_rad, b.q_cmd_rad, atol=_SAME_RAD)
 
 
 def with_rows(trace: Trace, chosen: Bools) -> Trace:

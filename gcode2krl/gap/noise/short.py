@@ -19,8 +19,10 @@ line).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.core import FLOATS, INT, INTS, OUT_FLOATS, core_function
@@ -43,9 +45,10 @@ def innovation_gains(
     transition = transition_of(a, slow)
     order = max(len(a), 1)
     variance = np.zeros_like(transition)
-    variance[:order, :order] = _stationary(transition[:order, :order], scale)
     driven = np.zeros_like(transition)
     driven[0, 0] = scale**2
+    short = slice(order), slice(order)
+    variance[short] = solve_discrete_lyapunov(transition[short], driven[short], method="direct")
     for i, (pole, sigma) in enumerate(slow, start=order):
         variance[i, i] = sigma**2
         driven[i, i] = sigma**2 * (1.0 - pole**2)
@@ -89,15 +92,6 @@ def innovations(
     return out
 
 
-def _stationary(transition: Floats, scale: float) -> Floats:
-    """Return P (m, m) = F·P·Fᵀ + Q of the autoregressive states, Q the variance of the first one."""
-    count = len(transition)
-    driven = np.zeros(count * count)
-    driven[0] = scale**2
-    system = np.eye(count * count) - np.kron(transition, transition)
-    return np.asarray(np.linalg.solve(system, driven), dtype=np.float64).reshape(count, count)
-
-
 _LIMITS = THRESHOLDS.noise
 _SETTLED = 500
 """Rows after which nothing is left of a start, with the largest pole allowed."""
@@ -119,8 +113,7 @@ _ROUNDS = 3
 """In which calm rows and the memory that tells them are found from each other."""
 
 
-@dataclass(frozen=True)
-class Slow:
+class Slow(NamedTuple):
     """A part of the noise with v[t] = pole·v[t-1] + …, whose rms is ``sigma``."""
 
     pole: float
@@ -148,16 +141,12 @@ class Noise:
 
     @cached_property
     def _gains(self) -> tuple[Floats, Floats]:
-        return innovation_gains(self.a, self.scale, self._slow, _MOST_SETTLING)
-
-    @property
-    def _slow(self) -> list[tuple[float, float]]:
-        return [(each.pole, each.sigma) for each in self.slow]
+        return innovation_gains(self.a, self.scale, self.slow, _MOST_SETTLING)
 
     def whiten(self, values: Floats, segments: Ints) -> Floats:
         """Return (n, c) filtered to white noise of unit variance, each segment by itself."""
         gains, variances = self._gains
-        return innovations(values, segments, self.a, self._slow, gains, variances)
+        return innovations(values, segments, self.a, self.slow, gains, variances)
 
     def calm_rows(self, values: Floats, segments: Ints) -> Bools:
         """Return which rows (n,) of values (n,) are, whitened, about as loud as the median window."""
@@ -306,7 +295,7 @@ def at_most(noise: Noise, sigma: float) -> Noise:
         beyond = float(np.sqrt(noise.short_sigma**2 - sigma**2))
         short = replace(white(sigma), slow=noise.slow, beyond=beyond)
     most = _LIMITS.noise_most_slow * short.short_sigma
-    return replace(short, slow=tuple(replace(each, sigma=min(each.sigma, most)) for each in short.slow))
+    return replace(short, slow=tuple(Slow(pole, min(sigma, most)) for pole, sigma in short.slow))
 
 
 def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
@@ -315,14 +304,9 @@ def unbiased(noise: Noise, of_drawn: Noise, floor: float) -> Noise:
         return noise
     a = _stable(2.0 * noise.a - of_drawn.a)
     scale = max(noise.scale**2 / of_drawn.scale, _LIMITS.noise_least_scale * floor)
-    steady = _gain(noise.a) * noise.scale
+    steady = float(np.sqrt(_short_autocovariance(noise.a, 1)[0])) * noise.scale
     sigma = max(noise.short_sigma * steady / of_drawn.short_sigma, floor, scale)
     return Noise(a, scale, sigma, noise.slow)
-
-
-def _gain(a: Floats) -> float:
-    """Return the rms of x for white e of unit variance."""
-    return float(np.sqrt(_short_autocovariance(a, 1)[0]))
 
 
 def _short_autocovariance(a: Floats, count: int) -> Floats:
@@ -343,10 +327,7 @@ def _short_autocovariance(a: Floats, count: int) -> Floats:
 
 def _stable(a: Floats) -> Floats:
     """Return the coefficients with all poles within the largest that is allowed."""
-    companion = np.zeros((len(a), len(a)))
-    companion[0] = a
-    companion[1:, :-1] = np.eye(len(a) - 1)
-    largest = float(np.abs(np.linalg.eigvals(companion)).max())
+    largest = float(np.abs(np.roots(np.append(1.0, -a))).max(initial=0.0))
     most = _LIMITS.noise_largest_pole
     if largest <= most:
         return a

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag, helmert
 
 from gcode2krl.arrays import Bools, Floats, Ints
 from gcode2krl.compiled.core import FLOATS, INTS, OUT_FLOATS, core_function
@@ -543,7 +544,7 @@ def _component(
     repeats: bool,
 ) -> BlockMeans:
     shared = np.column_stack([np.concatenate(signatures), np.concatenate(smooth)])
-    candidates = np.column_stack([shared, _block_diagonal([_steps(each) for each in numbers])])
+    candidates = np.column_stack([shared, block_diag(*map(_steps, numbers))])
     values, lengths = np.concatenate(y), [len(each) for each in numbers]
     if not repeats:
         return BlockMeans(values, _segments(numbers), known, candidates, _runs(lengths))
@@ -552,7 +553,7 @@ def _component(
         common = np.intersect1d(common, number)
     firsts = np.cumsum([0, *lengths[:-1]])
     rows = [first + np.flatnonzero(np.isin(own, common)) for first, own in zip(firsts, numbers, strict=True)]
-    contrasts = _contrasts(len(rows))
+    contrasts = helmert(len(rows))  # orthonormal
 
     def contrasted(columns: Floats) -> Floats:
         runs = np.stack([columns[at] for at in rows])
@@ -565,16 +566,6 @@ def _component(
 def _runs(lengths: Sequence[int]) -> tuple[tuple[int, int], ...]:
     ends = np.cumsum([0, *lengths]).tolist()
     return tuple(pairwise(ends))
-
-
-def _contrasts(runs: int) -> Floats:
-    """Return orthonormal contrasts (r - 1, r) of runs (Helmert)."""
-    rows = []
-    for i in range(1, runs):
-        row = np.zeros(runs)
-        row[:i], row[i] = 1.0, -float(i)
-        rows.append(row / np.sqrt(i * (i + 1.0)))
-    return np.array(rows)
 
 
 def _segments(numbers: Sequence[Ints]) -> Ints:
@@ -594,7 +585,7 @@ def _joined(columns: Sequence[Floats], count: int) -> Floats:
 
 def _stacked(means: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence[Nuisance]]) -> Floats:
     """Return what is never noise: each run's constant and trend, and mismatch, that of machines shared."""
-    trends = _block_diagonal([trend for trend, _ in means])
+    trends = block_diag(*(trend for trend, _ in means))
     shared, single = [], []
     for (_, usual), items in zip(means, nuisance, strict=True):
         widths = [each.columns.shape[2] for each in items]
@@ -602,18 +593,9 @@ def _stacked(means: Sequence[tuple[Floats, Floats]], nuisance: Sequence[Sequence
         shared.append(usual[:, is_shared])
         single.append(usual[:, ~is_shared])
     alike = len({each.shape[1] for each in shared}) == 1
-    together = np.concatenate(shared) if alike else _block_diagonal(shared)
-    columns = np.column_stack([trends, together, _block_diagonal(single)])
+    together = np.concatenate(shared) if alike else block_diag(*shared)
+    columns = np.column_stack([trends, together, block_diag(*single)])
     return columns[:, np.any(columns != 0.0, axis=0)]
-
-
-def _block_diagonal(parts: Sequence[Floats]) -> Floats:
-    whole = np.zeros((sum(len(each) for each in parts), sum(each.shape[1] for each in parts)))
-    row = column = 0
-    for part in parts:
-        whole[row : row + len(part), column : column + part.shape[1]] = part
-        row, column = row + len(part), column + part.shape[1]
-    return whole
 
 
 def _trend(numbers: Ints) -> Floats:

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, identity
 from gcode2krl.arrays import Floats, Ints
 from gcode2krl.effects import Applied
 from gcode2krl.gap.compare.interpolation import nearest_rows, resolution, rms, usual_deviation, usual_step_s
-from gcode2krl.gap.compare.trace import Trace
+from gcode2krl.gap.compare.trace import Trace, is_repeat
 from gcode2krl.gap.noise.nuisance import Nuisance
 from gcode2krl.gap.noise.short import (
     Noise,
@@ -43,9 +43,6 @@ _FAR = 8.0
 """Robust deviations from it beyond which a row is of an event: heavy tails hardly go there."""
 _ALIKE_SHARE = 0.5
 """Of six encoders, which must wander for that to be their noise."""
-_SAME_MM = 1e-3
-_SAME_RAD = 1e-3
-"""Repeats of a program have the same path; their logs differ by a servo and a start, not by a degree."""
 
 
 def noise_of(
@@ -71,7 +68,7 @@ def noise_of(
     residuals = source.without_spikes([trace.measured - trace.sample(applied) for trace in traces])
     means = block_means(traces, residuals, signatures, nuisance, source.repeats is not None)
     slow = [
-        _of_rows(slow_parts_of(each, floor), traces[0]) for each, floor in zip(means, floors, strict=True)
+        _of_rows(slow_parts_of(blocks, floor), traces[0]) for blocks, floor in zip(means, floors, strict=True)
     ]
     if traces[0].is_shown_at_tip or _in_few_joints(traces[0], slow):
         slow = [()] * len(slow)
@@ -153,13 +150,9 @@ class _Explained:
         width = sum(part.shape[2] for part in parts)
         self._columns = [list(_runs_of_columns(parts, j)) for j in range(trace.shape[1])]
         gram = np.zeros((width, width))
-        for of_component in self._columns:
-            used = np.concatenate(
-                [np.zeros(0, dtype=int), *(np.arange(at.start, at.stop) for at, _ in of_component)]
-            )
-            columns = np.concatenate(
-                [np.zeros((len(trace.time_s), 0)), *(run for _, run in of_component)], axis=1
-            )
+        for of_component in filter(None, self._columns):
+            used = np.concatenate([np.arange(at.start, at.stop) for at, _ in of_component])
+            columns = np.concatenate([run for _, run in of_component], axis=1)
             gram[np.ix_(used, used)] += columns.T @ columns
         self._kept = np.flatnonzero(np.diag(gram))
         self._scale = np.sqrt(np.diag(gram)[self._kept])
@@ -279,7 +272,7 @@ class _Source:
 
 def are_repeats(traces: Sequence[Trace]) -> bool:
     """Tell whether runs repeat one program, so that their noise is what differs between them."""
-    return len(traces) > 1 and all(_is_repeat(trace, traces[0]) for trace in traces[1:])
+    return len(traces) > 1 and all(is_repeat(trace, traces[0]) for trace in traces[1:])
 
 
 def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
@@ -288,15 +281,6 @@ def _repeats(traces: Sequence[Trace]) -> list[Ints] | None:
     if not are_repeats(traces):
         return None
     return [nearest_rows(trace.time_s, first.time_s) for trace in traces]
-
-
-def _is_repeat(trace: Trace, first: Trace) -> bool:
-    inputs, other = trace.inputs, first.inputs
-    if len(inputs) != len(other) or trace.shape[1] != first.shape[1]:
-        return False
-    # with relative angles every tip is zero, and the joints tell the programs apart
-    tips = np.allclose(inputs.position_mm, other.position_mm, atol=_SAME_MM)
-    return tips and np.allclose(inputs.q_cmd_rad, other.q_cmd_rad, atol=_SAME_RAD)
 
 
 def _differences(values: Sequence[Floats], rows: Sequence[Ints]) -> Floats:
@@ -379,9 +363,8 @@ def _few(
     """
     from scipy.special import fdtrc
 
-    turned, variances = (
-        np.concatenate(each) for each in zip(*_turned(traces, signatures, nuisance), strict=True)
-    )
+    of_traces = zip(*_turned(traces, signatures, nuisance), strict=True)
+    turned, variances = map(np.concatenate, of_traces)
     sigmas = rms(turned[:, -1]) * _SIGMAS
     count, taken = len(turned), list[int]()
     while True:

@@ -34,8 +34,19 @@ MOST_NATS = 1000.0
 _DIGITS = 4
 
 
+class _Numbered:
+    """Numbers with names."""
+
+    def as_dict(self: Any) -> dict[str, float | None]:
+        """Return name -> number, rounded."""
+        numbers = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {
+            k: None if number is None else float(f"{number:.{_DIGITS}g}") for k, number in numbers.items()
+        }
+
+
 @dataclass(frozen=True, kw_only=True)
-class Features:
+class Features(_Numbered):
     """What the tests say of a cause, numbers only; None where a test could not be made."""
 
     surprise: float
@@ -73,20 +84,12 @@ class Features:
     conditions_failed: int
     """How many of the conditions of a name fail: family best, form fits, no other beside it, one size."""
 
-    def as_dict(self) -> dict[str, float | None]:
-        """Return name -> number, rounded."""
-        return {entry.name: _rounded(getattr(self, entry.name)) for entry in fields(self)}
-
 
 NAMES = tuple(entry.name for entry in fields(Features))
 
 
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.{_DIGITS}g}")
-
-
 @dataclass(frozen=True, kw_only=True)
-class FamilyFeatures:
+class FamilyFeatures(_Numbered):
     """What is known of a family that the rest of a gap depends on."""
 
     lead_nats: float
@@ -100,29 +103,26 @@ class FamilyFeatures:
     larger_links: int
     """Links with a larger gap that has no name, or not all of one: what they leave may show here too."""
 
-    def as_dict(self) -> dict[str, float | None]:
-        """Return name -> number, rounded."""
-        return {entry.name: _rounded(getattr(self, entry.name)) for entry in fields(self)}
-
 
 FAMILY_NAMES = tuple(entry.name for entry in fields(FamilyFeatures))
 
 
 def family_features(
-    rest: Rest, evidence: Evidence, larger_links: int = 0, alike: Sequence[Evidence] = ()
+    unnamed: Rest, evidence: Evidence, larger_links: int = 0, alike: Sequence[Evidence] = ()
 ) -> FamilyFeatures:
     """Return the features of a family of a rest, or of the set of it and those that are ``alike``.
 
     No rivals are the families of other signals, of another joint, and another form of the same input.
     """
-    rivals = [each for each in rest.study.evidences if each.place.component == evidence.place.component]
+    study = unnamed.study
+    rivals = [each for each in study.evidences if each.place.component == evidence.place.component]
     told = {each.told for each in (evidence, *alike)}
     other = max((each.nats for each in rivals if each.told not in told), default=0.0)
     return FamilyFeatures(
         lead_nats=_within((evidence.nats - max(other, 0.0)) / _scatter(rivals[0])),
-        share=rest.share(evidence),
-        p=rest.study.p_of(evidence),
-        of_largest=min(max(evidence.nats, 0.0) / max(rest.study.evidences[0].nats, 1.0), 1.0),
+        share=unnamed.share(evidence),
+        p=study.p_of(evidence),
+        of_largest=min(max(evidence.nats, 0.0) / max(study.evidences[0].nats, 1.0), 1.0),
         larger_links=larger_links,
     )
 
@@ -147,7 +147,7 @@ class HeldOut:
 
 
 def features_of(
-    found: Examination,
+    examination: Examination,
     number: int,
     *,
     tests: FamilyTests,
@@ -157,19 +157,19 @@ def features_of(
     held_out: HeldOut,
 ) -> Features:
     """Return the features of an accepted effect."""
-    gain = found.gains[number]
-    least, errors = _LIMITS.counted_share * gain, found.errors_of_set_up
-    large = {each for each in found.cause_numbers if found.gains[each] >= least}
+    gain = examination.gains[number]
+    least, errors = _LIMITS.counted_share * gain, examination.errors_of_set_up
+    large = {cause for cause in examination.cause_numbers if examination.gains[cause] >= least}
     return Features(
-        surprise=_within(found.surprises[number] - found.level),
-        size_over_noise=(max(gain, 0.0) / found.data.values) ** 0.5,
+        surprise=_within(examination.surprises[number] - examination.level),
+        size_over_noise=(max(gain, 0.0) / examination.data.values) ** 0.5,
         margin=_within(tests.margin),
         form_ratio=tests.form_ratio,
         other_share=tests.other_share,
         other_power=tests.other_power,
         inconstancy=None if constant is None else constant.inconstancy,
         constant_p=None if constant is None else constant.p,
-        shape_interval=_shape_interval(found, number, parameters),
+        shape_interval=_shape_interval(examination, number, parameters),
         fold_agreement=held_out.agreement,
         shrink_of_rest=held_out.shrink_of_rest,
         shrink_where_others=held_out.shrink_where_others,
@@ -190,10 +190,10 @@ def _within(nats: float) -> float:
     return min(max(nats, -MOST_NATS), MOST_NATS)
 
 
-def _shape_interval(found: Examination, number: int, parameters: dict[str, Interval]) -> float:
+def _shape_interval(examination: Examination, number: int, parameters: dict[str, Interval]) -> float:
     """Return the widest interval of an effect's shapes over their ranges."""
-    free, applied = found.fitted.numbers.free[number], found.applied[number]
-    at_end = free.shapes_at_end(found.fitted.x[found.fitted.numbers.slices[number]])
+    fitted, applied = examination.fitted, examination.applied[number]
+    at_end = fitted.numbers.free[number].shapes_at_end(fitted.x[fitted.numbers.slices[number]])
     widths = [0.0]
     for p in applied.effect.parameters:
         if p.role not in (Role.SHAPE, Role.FREQUENCY) or not p.high > p.low:
@@ -391,63 +391,63 @@ class FamilyProbability:
     """That it or one of these is the right one; 0 of all but the first."""
 
 
-def family_probabilities(rest: Rest, larger_links: int = 0) -> list[FamilyProbability]:
+def family_probabilities(unnamed: Rest, larger_links: int = 0) -> list[FamilyProbability]:
     """Return the families of a rest with their probabilities, the most probable first.
 
     That of the family with the most evidence in a signal is calibrated. Of what it leaves, the others of that
     signal, and none of them, have shares by evidence, over the temperature as no model is exact.
     ``larger_links`` have a larger gap that has no name.
     """
-    components = {each.place.component for each in rest.study.evidences}
-    found = {component: _of_signal(rest, component, larger_links) for component in components}
-    whole = found.get(None)
-    every = [each for own in found.values() for each in own]
-    if whole is not None:
+    components = {each.place.component for each in unnamed.study.evidences}
+    of_signals = {component: _of_signal(unnamed, component, larger_links) for component in components}
+    families = [family for of_signal in of_signals.values() for family in of_signal]
+    if None in of_signals:
         # what moves all components together is not told of each of them once more
-        every = [_beside(each, whole[0]) for each in every]
-    return sorted(every, key=lambda each: -each.probability)
+        families = [_less_than(of_signals[None][0], family) for family in families]
+    return sorted(families, key=lambda family: -family.probability)
 
 
-def _beside(told: FamilyProbability, whole: FamilyProbability) -> FamilyProbability:
+def _less_than(whole: FamilyProbability, family: FamilyProbability) -> FamilyProbability:
     """Return a family of one component beside that of all, which is it where it has more evidence."""
-    if told.evidence.place.component is None or told.evidence.nats > whole.evidence.nats:
-        return told
+    if family.evidence.place.component is None or family.evidence.nats > whole.evidence.nats:
+        return family
     return replace(
-        told,
-        probability=min(told.probability, 1.0 - whole.probability),
-        set_probability=min(told.set_probability, 1.0 - whole.set_probability),
-        place_probability=min(told.place_probability, 1.0 - whole.place_probability),
+        family,
+        probability=min(family.probability, 1.0 - whole.probability),
+        set_probability=min(family.set_probability, 1.0 - whole.set_probability),
+        place_probability=min(family.place_probability, 1.0 - whole.place_probability),
     )
 
 
-def _of_signal(rest: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:
+def _of_signal(unnamed: Rest, component: int | None, larger_links: int) -> list[FamilyProbability]:
     """Return the families of one signal, in the order of the study."""
-    first, *others = [each for each in rest.study.evidences if each.place.component == component]
-    features = family_features(rest, first, larger_links)
-    own = probabilities_table().dependence(features)
+    first, *others = [each for each in unnamed.study.evidences if each.place.component == component]
+    features = family_features(unnamed, first, larger_links)
+    p = probabilities_table().dependence(features)
     behind = np.array([max(first.nats - each.nats, 0.0) / _scatter(first) for each in others])
     weights = np.exp(-behind / _LIMITS.temperature)
-    shares = np.minimum((1.0 - own) * weights / (1.0 + weights.sum()), own)
+    shares = np.minimum((1.0 - p) * weights / (1.0 + weights.sum()), p)
     near: dict[object, Evidence] = {}
-    for each, nats in zip(others, behind, strict=True):
-        if nats < declared_nats() and each.told != first.told:
-            near.setdefault(each.told, each)
+    for evidence, nats in zip(others, behind, strict=True):
+        if nats < declared_nats() and evidence.told != first.told:
+            near.setdefault(evidence.told, evidence)
     alike = tuple(near.values())[: _LIMITS.most_alike_families]
-    of_set = max(own, probabilities_table().dependence(family_features(rest, first, larger_links, alike)))
-    there = [float(s) for s, each in zip(shares, others, strict=True) if each.place.name == first.place.name]
-    at_first = max(_of_place(own), clipped(own + sum(there)))  # one input at a place excludes another
+    of_set = max(p, probabilities_table().dependence(family_features(unnamed, first, larger_links, alike)))
+    is_there = [evidence.place.name == first.place.name for evidence in others]
+    # one input at a place excludes another
+    at_first = max(
+        _of_place(p), clipped(p + sum(q for q, there in zip(shares, is_there, strict=True) if there))
+    )
     return [
-        FamilyProbability(first, features, own, max(at_first, _of_place(of_set)), alike, of_set),
+        FamilyProbability(first, features, p, max(at_first, _of_place(of_set)), alike, of_set),
         *(
             FamilyProbability(
-                each,
-                family_features(rest, each, larger_links),
-                float(share),
-                at_first
-                if each.place.name == first.place.name
-                else min(_of_place(float(share)), 1.0 - at_first),
+                evidence,
+                family_features(unnamed, evidence, larger_links),
+                float(q),
+                at_first if there else min(_of_place(float(q)), 1.0 - at_first),
             )
-            for each, share in zip(others, shares, strict=True)
+            for evidence, q, there in zip(others, shares, is_there, strict=True)
         ),
     ]
 

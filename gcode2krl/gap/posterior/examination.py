@@ -37,12 +37,11 @@ from gcode2krl.effects.dependence import Dependence
 from gcode2krl.effects.effect import JOINTS
 from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.clocks import gone
-from gcode2krl.gap.compare.events import command_changes
+from gcode2krl.gap.compare.events import command_changes, strongest_moments
 from gcode2krl.gap.compare.interpolation import nearest_rows, rms, usual_step_s, values_of
-from gcode2krl.gap.compare.jumps import strongest_moments
 from gcode2krl.gap.compare.links import SIGNALS
 from gcode2krl.gap.compare.trace import Context, Link, Trace, stretches_of, stretches_of_all
-from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_from, blocks_of, strongest_hz
+from gcode2krl.gap.components import Block, Signatures, blocks_at, blocks_of, strongest_hz
 from gcode2krl.gap.noise.nuisance import Candidates, Nuisance, NuisanceDesign, Question, nuisance_for
 from gcode2krl.gap.noise.short import Noise
 from gcode2krl.gap.posterior.gram import Gram, SignatureGram
@@ -135,18 +134,13 @@ def pooled(sizes: Sequence[Size]) -> Size:
     def mean(values: Sequence[float]) -> float:
         return sum(value * size.rows for value, size in zip(values, sizes, strict=True)) / rows
 
+    names = ("before", "after", "floor", "noise", "excess", "excess_before", "calm_excess")
     return Size(
         rows=rows,
-        before=mean([size.before for size in sizes]),
-        after=mean([size.after for size in sizes]),
-        floor=mean([size.floor for size in sizes]),
-        noise=mean([size.noise for size in sizes]),
-        excess=mean([size.excess for size in sizes]),
-        excess_before=mean([size.excess_before for size in sizes]),
+        **{name: mean([getattr(size, name) for size in sizes]) for name in names},
         deviation=mean([size.deviation for size in sizes]) / len(sizes) ** 0.5,
         largest_before=max(size.largest_before for size in sizes),
         largest_after=max(size.largest_after for size in sizes),
-        calm_excess=mean([size.calm_excess for size in sizes]),
         freedom=sum(size.freedom for size in sizes),
         moments_off=sum(size.moments_off for size in sizes),
         loud_in_step=max(size.loud_in_step for size in sizes),
@@ -184,9 +178,7 @@ def size_of_gap(
         calm_excess=_calm_mean_square(traces, structured, noise) - sigma2 - sum(e.beyond**2 for e in noise),
         freedom=freedom,
         moments_off=moments_off(traces, structured, [*usual, *applied]),
-        loud_in_step=max(
-            each(likelihood, structured) for each in (_loud_in_step, _rough_joint, _loud_at_work)
-        ),
+        loud_in_step=max(ask(likelihood, structured) for ask in (_loud_in_step, _rough_joint, _loud_at_work)),
     )
 
 
@@ -508,7 +500,9 @@ def question_of(link: Link, traces: Sequence[Trace], context: Context) -> Questi
         context.seed,
         context.joints,
         tuple(
-            each for each in context.judgements if each.verdict == "unexplained" and not each.link.tells_time
+            judged
+            for judged in context.judgements
+            if judged.verdict == "unexplained" and not judged.link.tells_time
         ),
     )
 
@@ -526,7 +520,7 @@ def _blocks(
     """
     if effect.moment is not None:
         stretches = len(np.unique(stretches_of_all(traces)))
-        yield from blocks_from(effect, target, moments_s(effect.moment.low, effect.moment.high), stretches)
+        yield from blocks_at(effect, target, moments_s(effect.moment.low, effect.moment.high), stretches)
         return
     p = effect.frequency
     if p is None:

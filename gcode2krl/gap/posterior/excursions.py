@@ -30,9 +30,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gcode2krl.arrays import Floats, Ints
-from gcode2krl.gap.compare.events import line_at
+from gcode2krl.gap.compare.events import jump_within, line_at
 from gcode2krl.gap.compare.interpolation import usual_step_s
-from gcode2krl.gap.compare.jumps import jump_within
 from gcode2krl.gap.compare.trace import Event, Trace, Whose
 from gcode2krl.gap.posterior.likelihood import Likelihood
 from gcode2krl.gap.thresholds import THRESHOLDS
@@ -98,8 +97,9 @@ def _windows(likelihood: Likelihood, residuals: Sequence[Floats]) -> Iterator[_W
         ]
         searched = list(product(_LIMITS.excursion_widths_s, _HALVES))
         for width_s, halves in searched:
-            for each in _of_width(likelihood.traces, rows, width_s, halves, len(groups) * len(searched)):
-                yield _Window(*each, halves, group)
+            searches = len(groups) * len(searched)
+            for window in _of_width(likelihood.traces, rows, width_s, halves, searches):
+                yield _Window(*window, halves, group)
 
 
 def _of_width(
@@ -195,8 +195,8 @@ def _gain(values: Floats, *columns: Floats) -> float:
 
 
 def _with_events(trace: Trace, number: int, windows: Sequence[_Window], residual: Floats) -> Trace:
-    own = tuple(_event(trace, each, residual) for each in windows if each.number == number)
-    return replace(trace, events=(*trace.events, *own)) if own else trace
+    events = tuple(_event(trace, each, residual) for each in windows if each.number == number)
+    return replace(trace, events=(*trace.events, *events)) if events else trace
 
 
 def _event(trace: Trace, window: _Window, residual: Floats) -> Event:

@@ -286,10 +286,8 @@ class Free:
         Of a time constant of 0.5 to 3600 s, 2 s are not at its end.
         """
         is_ratio = self.low > 0.0
-        x, low, high = (
-            np.where(is_ratio, np.log(np.where(is_ratio, each, 1.0)), each)
-            for each in (x, self.low, self.high)
-        )
+        ends = (x, self.low, self.high)
+        x, low, high = (np.where(is_ratio, np.log(np.where(is_ratio, v, 1.0)), v) for v in ends)
         span = high - low
         near: Bools = (x - low < _AT_BOUND * span) | (high - x < _AT_BOUND * span)
         near &= np.isfinite(span)

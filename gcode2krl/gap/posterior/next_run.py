@@ -38,7 +38,7 @@ from gcode2krl.errors import Gcode2KrlError
 from gcode2krl.gap.compare.interpolation import usual_step_s
 from gcode2krl.gap.compare.pair import Simulator
 from gcode2krl.gap.compare.trace import Context, Trace
-from gcode2krl.gap.components import Grid, Place, Signatures
+from gcode2krl.gap.components import Functions, Grid, Place, Signatures
 from gcode2krl.gap.noise.nuisance import nuisance_of
 from gcode2krl.gap.noise.short import white
 from gcode2krl.gap.noise.source import are_repeats
@@ -157,39 +157,19 @@ def _rows(trace: Trace, rows: Ints) -> Trace:
     )
 
 
-class _OnePlace(Grid):
-    """The hypotheses of one place."""
-
-    def __init__(self, name: str, traces: Sequence[Trace], sigma: Sequence[float]) -> None:
-        super().__init__(traces, sigma)
-        self._name = name
-
-    @property
-    def places(self) -> tuple[Place, ...]:
-        return tuple(place for place in super().places if place.name == self._name)
-
-
 def _functions(
     evidence: Evidence, traces: Sequence[Trace], sigma: Sequence[float]
 ) -> Iterator[tuple[list[Floats], Floats]]:
     """Yield columns (k, n, c) of each trace and a root (c, c') of the covariance of their weights."""
-    grid = _OnePlace(evidence.place.name, traces, sigma)
+    grid, name = Grid(traces, sigma), evidence.place.name
     if evidence.at is not None:
-        for place in grid.places:
-            columns = _lifted(place, list(_at(evidence, traces, place)))
+        for place in (each for each in grid.places if each.name == name):
+            columns, _ = place.lifted(Functions(tuple(_at(evidence, traces, place)), ()))
             yield columns, np.eye(columns[0].shape[2])
         return
-    for family in grid.families(evidence.on):
-        if family.on is evidence.on and family.place.name == evidence.place.name:
+    for family in grid.families(evidence.on, name):
+        if family.on is evidence.on:
             yield from ((list(family.columns), root) for root in family.roots)
-
-
-def _lifted(place: Place, functions: Sequence[Floats]) -> list[Floats]:
-    """Return functions (n, f) of each trace at a place, (k, n, f·d)."""
-    return [
-        (columns[None, :, :, None] * unit[:, :, None, :]).reshape(*unit.shape[:2], -1)
-        for columns, unit in zip(functions, place.units, strict=True)
-    ]
 
 
 def _at(evidence: Evidence, traces: Sequence[Trace], place: Place) -> Iterator[Floats]:
@@ -241,7 +221,7 @@ class Bench:
     """A program that a link would be measured in: signals of answers, and distances between them."""
 
     def __init__(self, examination: Examination, inputs: Inputs, mismatch: Mismatch) -> None:
-        self.found = examination
+        self._instruments = [model.sigma for model in examination.noise]
         self.trace = _trace_of(examination.traces[0], inputs)
         # the model's error comes to the instrument's noise
         off = self.trace.link.model_rms
@@ -269,13 +249,7 @@ class Bench:
 
     def of_family(self, evidence: Evidence, traces: Sequence[Trace]) -> Foretold | None:
         """Return what a family shows in the program, as the measured traces know it."""
-        return foretold_of(evidence, traces, self.trace, [each.sigma for each in self.found.noise])
-
-    def apart(
-        self, first: Sequence[Applied], second: Sequence[Applied], information: Floats | None = None
-    ) -> Apart:
-        """Return what sets two answers apart, the second one refitted as far as ``information`` lets it."""
-        return self.between(self.foretold(first), self.foretold(second, information))
+        return foretold_of(evidence, traces, self.trace, self._instruments)
 
     def between(self, first: Foretold, second: Foretold) -> Apart:
         """Return what sets two answers apart, the second one moved towards the first as far as it may be."""
@@ -320,7 +294,7 @@ class Bench:
             first=factor * float(values[0]),
             second=factor * float(values[1]),
             is_change=is_change,
-            unit=self.trace.unit,
+            unit=self.trace.link.unit,
             signal=self.trace.signal,
             noise=factor * float(sigma[column]),
             is_open=(first.is_open, second.is_open),
@@ -423,7 +397,7 @@ class OpenPair:
     second: Answer
     weight: float
     """Product of their probabilities; the one they share where the data cannot tell them apart."""
-    found: Examination
+    examination: Examination
     number: int | None
     """Which accepted effect both would stand in place of."""
     traces: tuple[Trace, ...] = ()
@@ -537,8 +511,8 @@ def has_repeats(judgement: Judgement) -> bool:
 
 def _is_event(judgement: Judgement) -> bool:
     """Tell whether what is left of a link is an impulse and nothing else."""
-    rest = judgement.rest
-    return bool(judgement.impulses) and not judgement.told.significant and not (rest and rest.is_gap)
+    is_gap = judgement.told.significant or (judgement.rest is not None and judgement.rest.is_gap)
+    return bool(judgement.impulses) and not is_gap
 
 
 def best(choices: Sequence[Choice]) -> Choice | None:
@@ -623,10 +597,10 @@ def _choices(pairs: Sequence[OpenPair], trials: Sequence[Trial], mismatch: Misma
         benches: dict[int, Bench] = {}
         partings = []
         for pair, (of_first, of_second) in zip(pairs, known, strict=True):
-            key = id(pair.found)
+            key = id(pair.examination)
             try:
                 if key not in benches:
-                    benches[key] = Bench(pair.found, trial.inputs, mismatch)
+                    benches[key] = Bench(pair.examination, trial.inputs, mismatch)
                 first, second = (_shown(pair, benches[key], each) for each in (of_first, of_second))
                 partings.append(_parting(pair, first, second, benches[key]))
             except Gcode2KrlError:  # an effect that this program cannot show
@@ -648,8 +622,8 @@ class _Known:
 def _known(pair: OpenPair, answer: Answer) -> _Known:
     if not answer.applied:
         return _Known(answer)
-    information = information_of(pair.found, pair.number, answer.applied)
-    return _Known(answer, information, allowed_by(information, answer.applied, pair.found.traces[0]))
+    information = information_of(pair.examination, pair.number, answer.applied)
+    return _Known(answer, information, allowed_by(information, answer.applied, pair.examination.traces[0]))
 
 
 def _shown(pair: OpenPair, bench: Bench, known: _Known) -> tuple[Foretold, list[Foretold]]:

@@ -149,9 +149,7 @@ _TRACKER_FRAME = "base_frame"
 
 def tracker_frame_slip(pairs: Sequence[Pair], library: Mapping[str, Effect]) -> list[Slip]:
     """Return another frame of the tracker, by which its tips are the predicted ones (Kabsch 1976)."""
-    traces = [
-        trace for trace in MECHANICS.traces(pairs) if not (trace.in_sensor_frame or trace.in_tool_frame)
-    ]
+    traces = [trace for trace in MECHANICS.traces(pairs) if trace.frame == "base"]
     effect = library.get(_TRACKER_FRAME)
     if effect is None or not traces or rms_before(traces) < THRESHOLDS.posterior.tracker_off_mm:
         return []

@@ -1,10 +1,24 @@
-"""Models of noise: what comes back from noise whose model is known."""
+"""Models of short noise: what comes back from noise whose model is known, against dense covariances."""
 
 import numpy as np
 import pytest
 from scipy.linalg import solve_triangular, toeplitz
 
-from gcode2krl.gap.noise.short import Noise, Slow, at_most, drawn_noise, drawn_slow, fit, unbiased, white
+from gcode2krl.gap.noise.short import (
+    Noise,
+    Slow,
+    at_most,
+    drawn_noise,
+    drawn_slow,
+    fit,
+    innovation_gains,
+    innovations,
+    unbiased,
+    white,
+    without_lines,
+)
+
+# Models of noise: what comes back from noise whose model is known
 
 
 def _segments(count):
@@ -135,3 +149,82 @@ def test_what_hardly_decays_is_brought_to_decay():
     found = fit([(x, _segments(len(x)))], 1e-9)
     poles = np.roots(np.concatenate([[1.0], -found.a]))
     assert np.abs(poles).max() <= 0.98 + 1e-9
+
+
+# Innovations beside the dense covariance: variances, log determinant, and every row of a segment
+
+A = np.array([0.9, -0.3])
+SLOW = [(0.98, 1.5)]
+
+
+def covariance(count):
+    """Return that of the short part, by its pulse response, plus that of the slow one."""
+    h = [1.0, A[0]]
+    for _ in range(400):
+        h.append(A[0] * h[-1] + A[1] * h[-2])
+    h = np.array(h)
+    short = 0.6**2 * np.array([h[: len(h) - k] @ h[k:] for k in range(count)])
+    return toeplitz(short + SLOW[0][1] ** 2 * SLOW[0][0] ** np.arange(count))
+
+
+def test_innovations_are_those_of_the_dense_covariance():
+    count = 60
+    gains, variances = innovation_gains(A, 0.6, SLOW, count)
+    factor = np.linalg.cholesky(covariance(count))
+    np.testing.assert_allclose(np.sqrt(variances), np.diag(factor), rtol=1e-7)
+    assert np.sum(np.log(variances)) == pytest.approx(np.linalg.slogdet(covariance(count))[1], rel=1e-7)
+    values = np.random.default_rng(1).standard_normal((count, 3))
+    white = innovations(values, np.array([[0, count]]), A, SLOW, gains, variances)
+    np.testing.assert_allclose(white, np.linalg.solve(factor, values), rtol=1e-6, atol=1e-9)
+
+
+def test_the_gain_settles_and_is_then_kept():
+    _, variances = innovation_gains(A, 0.6, SLOW, 5000)
+    assert len(variances) < 2000
+    whole = np.diag(np.linalg.cholesky(covariance(300))) ** 2
+    np.testing.assert_allclose(variances, whole[: len(variances)], rtol=1e-6)
+    np.testing.assert_allclose(variances[-1], whole[len(variances) :], rtol=1e-6)
+
+
+def test_without_a_slow_part_it_is_the_autoregressive_filter():
+    gains, variances = innovation_gains(A, 0.6, [], 50)
+    x = np.random.default_rng(2).standard_normal((50, 1))
+    white = innovations(x, np.array([[0, 50]]), A, [], gains, variances)[:, 0]
+    np.testing.assert_allclose(white[2:], (x[2:, 0] - A[0] * x[1:-1, 0] - A[1] * x[:-2, 0]) / 0.6, rtol=1e-9)
+
+
+# Tones are taken off noise, and nothing is where there is no tone
+
+COUNT = 1500
+
+
+def white_noise(seed):
+    return np.random.default_rng(seed).standard_normal(COUNT)
+
+
+@pytest.mark.parametrize("turns", [0.0523, 0.08317, 0.21])
+@pytest.mark.parametrize("rms", [0.5, 5.0])
+def test_a_tone_is_taken_off_and_the_noise_is_left(turns, rms):
+    e = white_noise(1)
+    tone = rms * np.sqrt(2.0) * np.sin(2.0 * np.pi * turns * np.arange(COUNT) + 0.4)
+    left = without_lines(e + tone)
+    assert np.std(left - e) < 0.1
+    assert left.std() == pytest.approx(e.std(), rel=0.02)
+
+
+def test_several_tones_go_one_after_the_other():
+    n = np.arange(COUNT)
+    tones = 3.0 * np.sin(0.3 * n) + 1.0 * np.sin(1.1 * n) + 0.5 * np.sin(0.72 * n)
+    assert np.std(without_lines(white_noise(2) + tones) - white_noise(2)) < 0.15
+
+
+def test_noise_without_a_tone_is_hardly_ever_touched():
+    coloured = Noise(np.array([0.7, 0.1, -0.1]), 1.0, 1.0)
+    for kind in (white_noise, lambda seed: drawn_noise(coloured, COUNT, np.random.default_rng(seed))):
+        touched = sum(not np.array_equal(without_lines(kind(seed)), kind(seed)) for seed in range(200))
+        assert touched <= 2
+
+
+def test_a_short_signal_stays_as_it_is():
+    x = np.sin(np.arange(100.0))
+    np.testing.assert_array_equal(without_lines(x), x)
