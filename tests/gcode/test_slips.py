@@ -1,22 +1,10 @@
 """Usual slips of hand-written code and of posts are named, each with a remedy that helps."""
 
-import io
-
 import pytest
 
-from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
+from tests.gcode import Control
 
-HEAD, END = "G21 G90 G17\nG0 X0 Y0 Z5\nG1 Z-1 F300\n", "G0 Z5\nM2\n"
-
-
-def errors(text):
-    """Return the errors of a program."""
-    try:
-        read_stream(io.BytesIO(f"{HEAD}{text}\n{END}".encode()), "part.nc")
-    except Gcode2KrlError as error:
-        return [issue for issue in error.issues if issue.severity == "error"]
-    return []
+SLIPS = Control("G21 G90 G17\nG0 X0 Y0 Z5\nG1 Z-1 F300\n", "G0 Z5\nM2")
 
 
 @pytest.mark.parametrize(
@@ -38,21 +26,21 @@ def errors(text):
     ],
 )
 def test_a_slip_is_named_and_its_remedy_helps(block, says, remedy, mended):
-    (found,) = errors(block)
-    assert found.line == 4
+    (found,) = SLIPS.errors(block)
+    assert found.line == 1
     assert says in found.message
     assert remedy in found.remedy
-    assert not errors(mended)
+    assert not SLIPS.errors(mended)
 
 
 @pytest.mark.parametrize("block", ["G2 X20 Y0 I3", "G2 X20 Y0 I10.2 J0.7"])
 def test_an_arc_that_fits_in_no_way_gets_no_hint(block):
-    (found,) = errors(block)
+    (found,) = SLIPS.errors(block)
     assert found.code == "arc-radius-mismatch"
     assert "radii fit" not in found.message
 
 
 def test_a_zero_across_the_plane_is_no_slip_where_the_plane_is_named():
-    assert not errors("G2 X20 Y0 Z-2 I10 J0 K0")
-    assert not errors("G2 X20 Z-2 I10 J0 K0")
-    assert not errors("G2 X20 I10 K0")
+    assert not SLIPS.errors("G2 X20 Y0 Z-2 I10 J0 K0")
+    assert not SLIPS.errors("G2 X20 Z-2 I10 J0 K0")
+    assert not SLIPS.errors("G2 X20 I10 K0")
