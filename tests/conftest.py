@@ -67,15 +67,16 @@ class Outcome:
 
 @pytest.fixture
 def run(capfd, tmp_path, monkeypatch):
-    """Run ``gcode2krl`` with arguments, in an empty folder; returns code, output and findings."""
+    """Run ``gcode2krl`` in an empty folder; returns code (which must be ``code``), output and findings."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GCODE2KRL_CACHE", str(tmp_path / "cache"))
 
-    def run_command(*arguments):
+    def run_command(*arguments, code=None):
         capfd.readouterr()
-        code = _run([str(argument) for argument in arguments])
+        found = _run([str(argument) for argument in arguments])
         out, err = capfd.readouterr()
-        return Outcome(code, out, err)
+        assert code in (None, found), err
+        return Outcome(found, out, err)
 
     return run_command
 

@@ -95,8 +95,7 @@ def test_a_record_has_what_a_page_needs(parts, run):
 def test_a_bad_part_does_not_stop_the_others(parts, run):
     (parts / "far.nc").write_text(REFUSED)
     (parts / "no.nc").write_text(NOT_UNDERSTOOD)
-    done = run("batch", parts, "-o", "out")
-    assert done.code == 1
+    done = run("batch", parts, "-o", "out", code=1)
     assert {part: record["exit_code"] for part, record in records("out").items()} == {
         "a.nc": 0,
         "b.NGC": 0,
@@ -210,17 +209,14 @@ def test_a_program_that_is_refused_now_does_not_stay(parts, run):
 
 def test_collisions_are_refused_before_anything_is_computed(parts, run):
     (parts / "A.ngc").write_text(GOOD.format(x=1))
-    done = run("batch", parts, "-o", "out")
-    assert done.code == 2
+    done = run("batch", parts, "-o", "out", code=2)
     assert "A.ngc" in done.err
     assert "a.nc" in done.err
     assert not (Path("out") / "results.jsonl").exists()
 
 
 def test_an_output_folder_without_a_parent_is_refused(parts, run):
-    done = run("batch", parts, "-o", "no/where")
-    assert done.code == 2
-    assert "output-unwritable" in done.err
+    assert "output-unwritable" in run("batch", parts, "-o", "no/where", code=2).err
 
 
 def test_the_cell_of_each_folder(parts, run, tmp_path):
@@ -240,9 +236,7 @@ def test_the_cell_of_each_folder(parts, run, tmp_path):
 
 def test_a_wrong_cell_ends_the_batch(parts, run, tmp_path):
     (tmp_path / "cell.toml").write_text("[robot]\nmodle = 1\n")
-    done = run("batch", parts, "-o", "out", "--cell", "cell.toml")
-    assert done.code == 2
-    assert "robot.modle" in done.err
+    assert "robot.modle" in run("batch", parts, "-o", "out", "--cell", "cell.toml", code=2).err
 
 
 def test_json_and_quiet(parts, run):
@@ -286,9 +280,7 @@ def test_the_cache_is_shown_and_cleared(parts, run, tmp_path):
 
 
 def test_several_parts_for_translate_name_the_batch(parts, run):
-    done = run(parts / "a.nc", parts / "b.NGC")
-    assert done.code == 2
-    assert "gcode2krl batch PARTS -o out/" in done.err
+    assert "gcode2krl batch PARTS -o out/" in run(parts / "a.nc", parts / "b.NGC", code=2).err
     assert "batch" not in run(parts / "a.nc", "--nonsense").err
 
 

@@ -1,4 +1,4 @@
-"""What a person reads on the terminal: few lines, the cause first, and how to learn more."""
+"""Findings as the command line shows and releases them."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from gcode2krl.cli import main as entry
+from gcode2krl.prediction import Prediction
 
 HEAD = ["G21 G90 G94 G17", "T1 M6", "G43 H1"]
 
@@ -110,3 +111,65 @@ def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture
     assert len(lines) <= 22
     assert len(codes) > 5
     assert max(map(codes.count, codes)) <= 8
+
+
+PART = (
+    "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\nG0 X0 Y0\nG0 Z2\nG1 Z-2 F600\n"
+    "X60\nG0 X0 Y30\nG0 Z30\nM5\nM30\n"
+)
+CELL = 'based_on = "demonstration"\n[stock]\nbox_mm = [[-20, -20, -10], [80, 50, 0]]\nresolution_mm = 0.5\n'
+CELL += "[material]\nrelative_band = 0.1\n"
+
+
+def test_a_rapid_through_stated_stock_refuses_a_compensated_program_too(run, tmp_path):
+    (tmp_path / "part.nc").write_text(PART)
+    (tmp_path / "cell.toml").write_text(CELL)
+    for more in ((), ("--compensate", "offline")):
+        done = run(
+            "part.nc", "-o", "part.src", "--cell", "cell.toml", "--pilot", "none", "--json", *more, code=1
+        )
+        found = [(i["severity"], i["code"], i["line"]) for i in json.loads(done.out)["issues"]]
+        assert ("error", "rapid-in-stock", 9) in found
+        assert not (tmp_path / "part.src").exists()
+
+
+SLOT = "G21 G90 G17\nT1 M6\nG0 G43 H1 X-20 Y0 Z50\nG0 Z5\nG1 Z-1 F600\nG1 X100 F1500\nG0 Z50\nM30\n"
+"""The spindle never turns."""
+
+
+@pytest.fixture
+def part(tmp_path):
+    path = tmp_path / "slot.nc"
+    path.write_text(SLOT, encoding="ascii")
+    return path
+
+
+def severities(done):
+    issues = json.loads(done.out)["issues"]
+    return {issue["severity"] for issue in issues if issue["code"] == "spindle-off"}
+
+
+def predict(run, part, *options):
+    return run("predict", part, "-o", "out", "--no-forces", "--json", *options)
+
+
+def test_a_finding_is_a_warning_where_it_is_allowed(run, part, tmp_path):
+    assert severities(predict(run, part)) == {"error"}
+    done = predict(run, part, "--allow", "spindle-off")
+    assert done.code == 0, done.err
+    assert severities(done) == {"warning"}
+    of_prediction = {issue.severity for issue in Prediction.load(tmp_path / "out").issues}
+    assert "error" in of_prediction  # whoever writes a program from it has to release it there
+    assert severities(run("report", "out", "--json")) == {"warning"}
+
+
+@pytest.mark.parametrize("word", ["spindle-of", "spindle-off:99", "spindle-off:x"])
+def test_a_release_that_means_nothing_is_refused(run, part, word):
+    done = predict(run, part, "--allow", word)
+    assert done.code == 2
+    assert [issue["code"] for issue in json.loads(done.out)["issues"]] == ["allow"]
+
+
+def test_a_release_of_a_folder_counts_where_its_finding_is(run, part, tmp_path):
+    (tmp_path / "gcode2krl.toml").write_text('allow = ["spindle-off", "g43-missing"]\n', encoding="utf-8")
+    assert severities(predict(run, part)) == {"warning"}

@@ -192,8 +192,7 @@ def test_force_drift(swinging, known):
 
 
 def test_tool_weight(swinging, known):
-    signals = run(swinging, known, "tool_weight:weight_N=40")
-    apart = signals.force_meas_base_N - swinging.force_base_N
+    apart = run(swinging, known, "tool_weight:weight_N=40").force_meas_base_N - swinging.force_base_N
     np.testing.assert_allclose(apart, np.tile([0.0, 0.0, -40.0], (len(apart), 1)), atol=1e-12)
 
 

@@ -177,8 +177,7 @@ def test_velocity_rule(cell, known):
     assert slow.time_s[-1] == pytest.approx(130.0 / 50.0 + 3 * (50.0 / 500.0 + 0.4), abs=0.013)
     late = run(inputs, known, "velocity_rule:k_s=0.4")
     assert late.time_s[-1] == pytest.approx(nominal + 3 * (0.4 - 0.168), abs=0.013)
-    same = run(inputs, known, f"velocity_rule:acc_cp_m_s2={cell.controller.acc_cp_m_s2}")
-    assert same.inputs is inputs
+    assert run(inputs, known, f"velocity_rule:acc_cp_m_s2={cell.controller.acc_cp_m_s2}").inputs is inputs
 
 
 def _rests(inputs, least_s):
@@ -201,8 +200,7 @@ def test_advance_stop(milling, known):
     assert _rests(milling, 0.4) == 0
     assert _rests(signals.inputs, 0.49) == 2
     assert signals.time_s[-1] - milling.time_s[-1] > 1.0
-    none = run(milling, known, "advance_stop:count=0,hold_s=0.5")
-    assert none.inputs is milling
+    assert run(milling, known, "advance_stop:count=0,hold_s=0.5").inputs is milling
 
 
 def ramps(inputs, acceleration, run_s=0.4, pause_s=1.2):

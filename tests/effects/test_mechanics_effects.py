@@ -143,8 +143,7 @@ def held(inputs, force, moment=0.0):
 def test_hysteresis_loses_between_the_branches(swinging, known):
     triangle = np.concatenate([np.linspace(0, 1, 50), np.linspace(1, -1, 101), np.linspace(-1, 1, 101)])
     still = held(swinging, triangle[:, None] * np.array([0.0, 400.0, 0.0]))
-    signals = run(still, known, "hysteresis:target=A1,loss_deg=0.03")
-    extra = (signals.q_true_rad - still.q_cmd_rad)[:, 0] / DEG
+    extra = (run(still, known, "hysteresis:target=A1,loss_deg=0.03").q_true_rad - still.q_cmd_rad)[:, 0] / DEG
     torque = torque_by_virtual_work(still, 0)
     falling, rising = 100, 201  # no force
     assert abs(torque[falling]) < 1e-6

@@ -3,6 +3,7 @@
 import builtins
 import subprocess
 import sys
+from inspect import isfunction
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ import pytest
 
 from gcode2krl import Gcode2KrlError, Issue, predict
 from gcode2krl.exchange import ColumnFrame, Findings, unit_of
+from gcode2krl.exchange.views import VIEWS, view
 from tests.conftest import ROOT
 
 STAGES = ("toolpath", "targets", "motion", "joints", "forces", "deflection")
@@ -168,3 +170,8 @@ def test_no_findings_are_an_empty_table():
     assert pa.table(nothing).num_rows == 0
     assert "no findings" in nothing._repr_html_()
     assert repr(Findings([Issue("note", "a", 0, "b")])) == "Findings(1 note)"
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_what_shows_a_result_is_there(name):
+    assert isfunction(view(name))

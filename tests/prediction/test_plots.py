@@ -36,8 +36,9 @@ def test_a_figure_is_one_of_matplotlib(prediction, name):
 
 @pytest.mark.slow
 def test_the_command_draws_the_same(prediction, run, tmp_path):
-    done = run("predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet", "--isolated")
-    assert done.code == 0, done.err
+    run(
+        "predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet", "--isolated", code=0
+    )
     assert {file.stem for file in (tmp_path / "out").glob("*.png")} == set(FIGURES)
     with look():
         prediction.plot.force().savefig(tmp_path / "force.png", dpi=150)
