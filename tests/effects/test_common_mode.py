@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcode2krl.effects import parse, simulate
 from gcode2krl.effects.effect import JOINTS, LINKS
+from tests.effects import run
 
 COMMON = [
     ("servo_lag", "tau_s=0.02", "q_act_rad"),
@@ -16,10 +16,6 @@ COMMON = [
     ("backlash", "gap_deg=0.02", "q_load_rad"),
 ]
 HZ, SWING = 0.6, 0.1
-
-
-def run(inputs, known, *texts):
-    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,7 @@ from gcode2krl.cutting import cut, no_forces
 from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.effects.apply import remembered
 from gcode2krl.errors import NotUnderstoodError
-
-
-def run(inputs, known, *texts):
-    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
+from tests.effects import run
 
 
 def with_material(cell, **change):

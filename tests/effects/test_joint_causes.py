@@ -8,12 +8,9 @@ import pytest
 from gcode2krl import robot
 from gcode2krl.effects import parse, simulate
 from gcode2krl.errors import NotUnderstoodError
+from tests.effects import run
 
 DEG = np.pi / 180.0
-
-
-def run(inputs, known, text):
-    return simulate(inputs, [parse(text, known, inputs.cell)])
 
 
 def test_a_step_of_the_tip_stays(swinging, known):

@@ -14,12 +14,9 @@ from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
+from tests.effects import run
 
 DEG = np.pi / 180.0
-
-
-def run(inputs, known, *texts):
-    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
 
 
 def standing(q, inputs):

@@ -8,14 +8,11 @@ import pytest
 from gcode2krl import robot
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import deflection_of
-from gcode2krl.effects import parse, simulate
+from gcode2krl.effects import simulate
 from gcode2krl.frames import rotation_from_quaternion
+from tests.effects import run
 
 DEG = np.pi / 180.0
-
-
-def run(inputs, known, text, **more):
-    return simulate(inputs, [parse(text, known, inputs.cell)], **more)
 
 
 def moved_by(inputs, known, text):

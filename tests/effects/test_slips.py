@@ -8,13 +8,10 @@ import pytest
 from gcode2krl import robot
 from gcode2krl.cell.sections import Frame
 from gcode2krl.compliance import deflection_of, displace, project_normal
-from gcode2krl.effects import parse, simulate
+from gcode2krl.effects import simulate
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.frames import rotation_from_quaternion
-
-
-def run(inputs, known, text, **more):
-    return simulate(inputs, [parse(text, known, inputs.cell)], **more)
+from tests.effects import run
 
 
 def unloaded(inputs):

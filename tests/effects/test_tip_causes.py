@@ -8,10 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import robot
 from gcode2krl.effects import Applied, parse, simulate
-
-
-def run(inputs, known, text, **more):
-    return simulate(inputs, [parse(text, known, inputs.cell)], **more)
+from tests.effects import run
 
 
 def moved_by(inputs, known, text):
