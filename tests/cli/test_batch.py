@@ -1,6 +1,5 @@
 """``gcode2krl batch``: what is written, what a second run computes, what a killed worker and Ctrl-C cost."""
 
-import contextlib
 import hashlib
 import json
 import os
@@ -18,6 +17,7 @@ import trimesh
 from gcode2krl.batch import results
 from gcode2krl.batch.cache import FOLDER_VARIABLE
 from gcode2krl.result.model import Record
+from tests.cli import on_a_terminal
 from tests.conftest import HEEDS_CTRL_C, ROOT
 
 HEAD = "G21 G90 G17\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG43 H1 Z20\n"
@@ -287,22 +287,9 @@ def test_several_parts_for_translate_name_the_batch(parts, run):
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal")
 def test_on_a_terminal_the_lines_stand_above_one_bar(parts, tmp_path):
-    import pty
-
-    ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "gcode2krl", "batch", str(parts), "-o", "out"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
-    process = subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=theirs
-    )
-    os.close(theirs)
-    shown = b""
-    with contextlib.suppress(OSError):  # the end of a pseudo-terminal on Linux
-        while piece := os.read(ours, 65536):
-            shown += piece
-    os.close(ours)
-    assert process.wait(60) == 0
-    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode("utf-8"))
+    code, shown, _ = on_a_terminal(tmp_path, "batch", parts, "-o", "out", stdout=subprocess.DEVNULL)
+    assert code == 0
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)
     lines = [line for line in re.split(r"[\r\n]+", plain) if "written" in line]
     assert len(lines) == 3
     assert all(line.startswith("written ") for line in lines)

@@ -1,14 +1,13 @@
 """`gcode2krl models confirm`: who is asked what, and what is written."""
 
 import json
-import os
-import subprocess
 import sys
 
 import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cell.fingerprint import values_by_section
+from tests.cli import on_a_terminal
 from tests.conftest import ROOT
 
 SOURCE = ROOT / "examples" / "cells" / "spindle_on_analog_output.toml"
@@ -110,21 +109,6 @@ def test_a_person_is_asked_section_by_section(cell_file, shown, is_this):
 
 def at_terminal(cell_file, answers):
     """Run the command with a person who types these lines; return what the terminal shows, and the code."""
-    import pty
-
-    master, slave = pty.openpty()
-    command = [sys.executable, "-m", "gcode2krl", "models", "confirm", str(cell_file)]
-    with subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, close_fds=True) as process:
-        os.close(slave)
-        os.write(master, "".join(f"{answer}\n" for answer in answers).encode())
-        output = b""
-        while True:
-            try:
-                part = os.read(master, 65536)
-            except OSError:  # the other end is closed
-                break
-            if not part:
-                break
-            output += part
-    os.close(master)
-    return output.decode().replace("\r\n", "\n"), process.returncode
+    typed = "".join(f"{answer}\n" for answer in answers)
+    code, shown, _ = on_a_terminal(cell_file.parent, "models", "confirm", cell_file, typed=typed)
+    return shown, code
