@@ -14,8 +14,9 @@ from gcode2krl.effects import Applied, Effect, Parameter, from_cell, library, pa
 from gcode2krl.effects.effect import LINKS
 from gcode2krl.errors import NotUnderstoodError
 from tests.conftest import ROOT
+from tests.effects import KNOWN
 
-KNOWN, CELL = library(), load_cell()
+CELL = load_cell()
 DOCS = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
 OWN = next(block for block in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL) if "EFFECT =" in block)
 
@@ -32,9 +33,9 @@ CAUSES, SLIPS = map(told, TABLE.split("| **set-up slips** |"))
 TOLD = CAUSES | SLIPS | {"base_number": CAUSES["base_frame"]}
 
 
-def test_the_documentation_has_every_effect(known):
-    assert {name for name, effect in known.items() if effect.kind == "cause"} == set(CAUSES)
-    assert {name for name, effect in known.items() if effect.kind == "slip"} == set(SLIPS)
+def test_the_documentation_has_every_effect():
+    assert {name for name, effect in KNOWN.items() if effect.kind == "cause"} == set(CAUSES)
+    assert {name for name, effect in KNOWN.items() if effect.kind == "slip"} == set(SLIPS)
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -47,8 +48,8 @@ def test_the_documentation_has_every_parameter(name):
     assert TOLD[name] <= {word for one in at_targets for word in (*one.names, *one.vectors)}
 
 
-def test_every_effect_says_what_a_diagnosis_needs(known, cell):
-    for name, effect in known.items():
+def test_every_effect_says_what_a_diagnosis_needs(cell):
+    for name, effect in KNOWN.items():
         assert effect.family, name
         assert effect.links <= set(LINKS), name
         assert effect.links, name
@@ -72,8 +73,8 @@ def test_every_effect_says_what_a_diagnosis_needs(known, cell):
         ("stiffness:scale=0.8,target=linked_arm", "linked_arm", {"scale": 0.8}),
     ],
 )
-def test_texts(known, cell, text, target, values):
-    applied = parse(text, known, cell)
+def test_texts(cell, text, target, values):
+    applied = parse(text, KNOWN, cell)
     assert applied.target == target
     assert values.items() <= applied.values.items()
     assert set(applied.values) == set(applied.effect.names)
@@ -99,9 +100,9 @@ def test_texts(known, cell, text, target, values):
         ("clock:target=scanner,offset_s=1", "tracker, force, controller, q_load, q_cmd"),
     ],
 )
-def test_errors_say_what_is_allowed(known, cell, text, said):
+def test_errors_say_what_is_allowed(cell, text, said):
     with pytest.raises(NotUnderstoodError, match=said) as caught:
-        parse(text, known, cell)
+        parse(text, KNOWN, cell)
     assert caught.value.exit_code == 2
     assert text.strip() in str(caught.value)
 
@@ -113,31 +114,31 @@ def test_any_text_is_understood_or_refused(text):
             assert isinstance(parse(start + text, KNOWN, CELL), Applied)
 
 
-def test_text_of_an_effect_is_read_back(known, cell):
+def test_text_of_an_effect_is_read_back(cell):
     for text in (
         "hose_pack:h0_N=1/2/3",
         "velocity_rule:k_s=0.2",
         "tool_number:target=3",
         "tool_wear:growth_per_m=0.1",
     ):
-        applied = parse(text, known, cell)
-        again = parse(str(applied), known, cell)
+        applied = parse(text, KNOWN, cell)
+        again = parse(str(applied), KNOWN, cell)
         assert (again.effect, again.target) == (applied.effect, applied.target)
         assert str(again) == str(applied)
 
 
-def test_the_cell_file_states_effects(known, cell):
+def test_the_cell_file_states_effects(cell):
     entries = (
         EffectEntry(name="backlash", target="A2", parameters={"gap_deg": 0.02}, source="diagnosed"),
         EffectEntry(name="thermal", parameters={"mm_per_h": 0.2, "direction": (0.0, 0.0, 1.0)}),
     )
-    found = from_cell(cell.model_copy(update={"effects": entries}), known)
+    found = from_cell(cell.model_copy(update={"effects": entries}), KNOWN)
     assert [one.label for one in found] == ["backlash A2", "thermal"]
     assert found[1]["direction_z"] == 1.0
     wrong = (*entries, EffectEntry(name="backlash", target="A2", parameters={"gap": 1.0}))
     with pytest.raises(NotUnderstoodError, match=r"\[\[effects\]\] 3.*gap_deg"):
-        from_cell(cell.model_copy(update={"effects": wrong}), known)
-    assert resolve([found[0], "backlash:target=A1,gap_deg=0.1"], known, cell)[1].label == "backlash A1"
+        from_cell(cell.model_copy(update={"effects": wrong}), KNOWN)
+    assert resolve([found[0], "backlash:target=A1,gap_deg=0.1"], KNOWN, cell)[1].label == "backlash A1"
 
 
 def test_an_effect_of_ones_own_takes_part(tmp_path, swinging, cell):
