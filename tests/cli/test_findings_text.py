@@ -5,22 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl.cli import main as entry
 from gcode2krl.prediction import Prediction
 
 HEAD = ["G21 G90 G94 G17", "T1 M6", "G43 H1"]
 
 
-def _run(*words: str) -> int:
-    with pytest.raises(SystemExit) as left:
-        entry.main(list(words))
-    return int(left.value.code or 0)
+@pytest.fixture
+def translate(run):
+    """Translate lines as part.nc, but for its forces."""
 
+    def translate(lines, *options, code):
+        Path("part.nc").write_text("\n".join([*lines, "M30", ""]))
+        return run("part.nc", "-o", "part.src", "--no-forces", *options, code=code)
 
-def _part(folder: Path, lines: list[str]) -> str:
-    file = folder / "part.nc"
-    file.write_text("\n".join([*lines, "M30", ""]))
-    return str(file)
+    return translate
 
 
 def _cuts(count: int, before: str = "G0 Z5") -> list[str]:
@@ -28,10 +26,8 @@ def _cuts(count: int, before: str = "G0 Z5") -> list[str]:
     return [line for k in range(count) for line in (before, f"G0 X{100 + k} Y0", "G1 Z-1 F500", "G1 Y10")]
 
 
-def test_a_spindle_that_never_runs_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    part = _part(tmp_path, [*HEAD, "G0 X100 Y0 Z5", *_cuts(60)])
-    assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
-    lines = capsys.readouterr().err.splitlines()
+def test_a_spindle_that_never_runs_is_one_line(translate):
+    lines = translate([*HEAD, "G0 X100 Y0 Z5", *_cuts(60)], code=1).err.splitlines()
     errors = [line for line in lines if ": error:" in line]
     assert len(errors) == 1
     assert (
@@ -40,21 +36,17 @@ def test_a_spindle_that_never_runs_is_one_line(tmp_path: Path, capsys: pytest.Ca
     )
 
 
-def test_json_lists_every_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    part = _part(tmp_path, [*HEAD, "G0 X100 Y0 Z5", *_cuts(60)])
-    assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces", "--json") == 1
-    issues = json.loads(capsys.readouterr().out)["issues"]
+def test_json_lists_every_finding(translate):
+    done = translate([*HEAD, "G0 X100 Y0 Z5", *_cuts(60)], "--json", code=1)
+    issues = json.loads(done.out)["issues"]
     assert sum(issue["code"] == "spindle-off" for issue in issues) == 60
     assert all(set(issue) == {"severity", "code", "line", "message", "remedy"} for issue in issues)
 
 
-def test_what_follows_from_an_unread_line_is_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_follows_from_an_unread_line_is_counted(translate):
     """As in a program whose feed is a parameter: the first bad line is the news, not 45 missing feeds."""
-    part = _part(tmp_path, [*HEAD, "S8000 M3", "#1=-1", "G0 X100 Y0 Z5", "F[SQRT[#1]]", "G1 Z-1", "G1 X1 $"])
-    assert _run(part, "-o", str(tmp_path / "part.src")) == 2
-    lines = capsys.readouterr().err.splitlines()
+    program = [*HEAD, "S8000 M3", "#1=-1", "G0 X100 Y0 Z5", "F[SQRT[#1]]", "G1 Z-1", "G1 X1 $"]
+    lines = translate(program, code=2).err.splitlines()
     assert ":7: error: " in lines[0]
     assert "[expression-value]" in lines[0]
     assert not [line for line in lines if "[no-feed]" in line]
@@ -68,45 +60,31 @@ def test_what_follows_from_an_unread_line_is_counted(
         (["S8000 M3", "T2 M6", "G43 H2"], "it was stopped by M6 in line 5"),
     ],
 )
-def test_what_left_the_spindle_off_is_named(
-    lines: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    part = _part(tmp_path, [*HEAD, *lines, "G0 X100 Y0 Z5", "G1 Z-1 F500"])
-    assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
-    assert f"feed move with the spindle off: {said} [spindle-off]" in capsys.readouterr().err
+def test_what_left_the_spindle_off_is_named(translate, lines, said):
+    done = translate([*HEAD, *lines, "G0 X100 Y0 Z5", "G1 Z-1 F500"], code=1)
+    assert f"feed move with the spindle off: {said} [spindle-off]" in done.err
 
 
-def test_an_axis_without_a_position_is_named_with_what_lost_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0", "G1 X110 F500"])
-    assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 2
-    assert "Z is given no absolute position in 6 lines" in capsys.readouterr().err
-    part = _part(tmp_path, [*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"])
-    assert _run(part, "-o", str(tmp_path / "part.src"), "--no-forces") == 1
-    assert "Z is unknown since the" in capsys.readouterr().err
+def test_an_axis_without_a_position_is_named_with_what_lost_it(translate):
+    done = translate([*HEAD, "S8000 M3", "G0 X100 Y0", "G1 X110 F500"], code=2)
+    assert "Z is given no absolute position in 6 lines" in done.err
+    done = translate([*HEAD, "S8000 M3", "G0 X100 Y0 Z5", "G28 Z0", "G1 X110 F500"], code=1)
+    assert "Z is unknown since the" in done.err
 
 
-def test_a_terminal_is_told_how_to_learn_more(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    part = _part(tmp_path, [*HEAD, "G0 X100 Y0 Z5", "G1 Z-1 F500"])
-    output = ["-o", str(tmp_path / "part.src"), "--no-forces"]
-    assert _run(part, *output) == 1
-    assert "explain" not in capsys.readouterr().err
+def test_a_terminal_is_told_how_to_learn_more(translate, monkeypatch):
+    lines = [*HEAD, "G0 X100 Y0 Z5", "G1 Z-1 F500"]
+    assert "explain" not in translate(lines, code=1).err
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    assert _run(part, *output) == 1
-    assert capsys.readouterr().err.splitlines()[-1] == "`gcode2krl explain spindle-off` says more"
-    assert _run(part, *output, "-q") == 1
-    assert "explain" not in capsys.readouterr().err
+    assert translate(lines, code=1).err.splitlines()[-1] == "`gcode2krl explain spindle-off` says more"
+    assert "explain" not in translate(lines, "-q", code=1).err
 
 
-def test_no_cause_fills_the_screen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_cause_fills_the_screen(translate):
     """Every kind of bad line 300 times over: at most eight lines of a kind, twenty in all, then counts."""
     kinds = ["G1 X[1+]", "G5.2 X1", "G1 X1 $", "G1 X1 X2", "A90", "G0 G1 X1", "G1 X1 X2", "G1 Q5", "M66 P1"]
-    part = _part(tmp_path, [f"{kind}" for k in range(30) for kind in kinds for _ in range(k % 3 + 1)])
-    assert _run(part, "-o", str(tmp_path / "part.src")) == 2
-    lines = capsys.readouterr().err.splitlines()
+    program = [kind for k in range(30) for kind in kinds for _ in range(k % 3 + 1)]
+    lines = translate(program, code=2).err.splitlines()
     codes = [line.partition(" [")[2].partition("]")[0] for line in lines if ": error:" in line]
     assert len(lines) <= 22
     assert len(codes) > 5

@@ -11,7 +11,6 @@ from pathlib import Path
 import click
 import pytest
 
-from gcode2krl.cli import main as entry
 from gcode2krl.cli.completion import SHELLS, VARIABLE, script
 from gcode2krl.cli.main import _COMMANDS, commands
 from gcode2krl.cli.on_use import CommandsOnUse
@@ -103,16 +102,9 @@ def test_libraries_for_matrices_use_one_thread_unless_told_otherwise():
     assert done.stdout.split()[-2:] == ["1", "2"]
 
 
-def _run(*words: str) -> int:
-    with pytest.raises(SystemExit) as left:
-        entry.main(list(words))
-    return int(left.value.code or 0)
-
-
 @pytest.mark.parametrize("word", ["spindle-off", "Spindle-Off", "spindle-off:12", "[spindle-off]"])
-def test_explains_a_code_as_it_is_printed(word: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run("explain", word) == 0
-    text = capsys.readouterr().out
+def test_explains_a_code_as_it_is_printed(run, word):
+    text = run("explain", word, code=0).out
     first, *rest = text.splitlines()
     assert first == "spindle-off: error, warning"
     assert [line.split()[0] for line in rest if line.startswith("  ") and line[2] != " "] == [
@@ -125,29 +117,23 @@ def test_explains_a_code_as_it_is_printed(word: str, capsys: pytest.CaptureFixtu
     assert max(map(len, rest)) <= 100
 
 
-def test_lists_all_codes_with_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run("explain") == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_lists_all_codes_with_one_line_each(run):
+    lines = run("explain", code=0).out.splitlines()
     assert [line.split()[0] for line in lines] == list(all_codes())
     assert max(map(len, lines)) <= 110
 
 
-def test_an_unknown_code_is_answered_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run("explain", "spindel-off") == 2
-    assert "did you mean 'spindle-off'?" in capsys.readouterr().err
-    assert _run("explain", "qqqq") == 2
-    assert "lists all" in capsys.readouterr().err
+def test_an_unknown_code_is_answered_with_the_nearest(run):
+    assert "did you mean 'spindle-off'?" in run("explain", "spindel-off", code=2).err
+    assert "lists all" in run("explain", "qqqq", code=2).err
 
 
-def test_json_holds_every_column(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run("explain", "no-feed", "--json") == 0
-    (record,) = json.loads(capsys.readouterr().out)["codes"]
+def test_json_holds_every_column(run):
+    (record,) = json.loads(run("explain", "no-feed", "--json", code=0).out)["codes"]
     assert record["code"] == "no-feed"
     assert set(record) == {"code", "severity", "why", "example", "remedy", "allow", "follows"}
-    assert _run("explain", "--json") == 0
-    assert len(json.loads(capsys.readouterr().out)["codes"]) == len(all_codes())
-    assert _run("explain", "nofeed", "--json") == 2
-    assert json.loads(capsys.readouterr().out)["issues"][0]["code"] == "code-unknown"
+    assert len(json.loads(run("explain", "--json", code=0).out)["codes"]) == len(all_codes())
+    assert json.loads(run("explain", "nofeed", "--json", code=2).out)["issues"][0]["code"] == "code-unknown"
 
 
 @pytest.mark.parametrize(
@@ -160,29 +146,18 @@ def test_json_holds_every_column(capsys: pytest.CaptureFixture[str]) -> None:
         ("q" * 300, "no such file"),
     ],
 )
-def test_a_mistyped_command_is_one_line(
-    word: str, said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert _run(word, "x.nc") == 2
-    lines = capsys.readouterr().err.splitlines()
+def test_a_mistyped_command_is_one_line(run, word, said):
+    lines = run(word, "x.nc", code=2).err.splitlines()
     assert len(lines) == 1
     assert said in lines[0]
 
 
-def test_a_part_may_be_called_much_like_a_command(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_part_may_be_called_much_like_a_command(run):
     Path("predct").write_text("G1 X5\nM30\n")
-    assert _run("predct", "-o", "part.src") == 2
-    assert (
-        "predct:1: error: feed move without a feed: no F above 0 since the start" in capsys.readouterr().err
-    )
-    assert _run("predct.nc", "-o", "part.src") == 2
-    assert "predct.nc: error: cannot read" in capsys.readouterr().err
-    assert _run("-o", "part.src", "predct") == 2
-    assert "[no-feed]" in capsys.readouterr().err
+    said = run("predct", "-o", "part.src", code=2).err
+    assert "predct:1: error: feed move without a feed: no F above 0 since the start" in said
+    assert "predct.nc: error: cannot read" in run("predct.nc", "-o", "part.src", code=2).err
+    assert "[no-feed]" in run("-o", "part.src", "predct", code=2).err
 
 
 CHECKED_BY = {
