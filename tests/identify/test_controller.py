@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from gcode2krl import set_targets
-from gcode2krl.cli.main import _run
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.identify import controller as identify
@@ -316,4 +315,4 @@ def test_command_with_a_program_of_the_cells_cdis(run, tmp_path, text):
 
 def test_command_without_a_trace(run):
     assert "none.csv: error" in run("identify", "controller", "none.csv", code=2).err
-    assert _run(["identify", "controller", "none.csv", "--plot", "nowhere/figure.png"]) == 2
+    run("identify", "controller", "none.csv", "--plot", "nowhere/figure.png", code=2)

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gcode2krl.cli.main import main
 from gcode2krl.errors import NotUnderstoodError
 from tests.cells import OWN_CELL
 from tests.krl.conftest import Made, verified
@@ -178,25 +177,19 @@ def test_tampering_is_noticed(made, name):
 
 
 @pytest.mark.parametrize("name", list(TAMPERINGS)[::8])
-def test_the_command_refuses_what_was_tampered_with(made, name, capsys):
+def test_the_command_refuses_what_was_tampered_with(made, name, run):
     edit, code = TAMPERINGS[name]
     tampered(made, edit)
-    with pytest.raises(SystemExit) as leaving:
-        main(["verify", str(made.src), str(made.part), "-q"])
-    assert leaving.value.code == 1
-    assert f"[{code}]" in capsys.readouterr().err
+    assert f"[{code}]" in run("verify", made.src, made.part, "-q", code=1).err
 
 
-def test_untouched_program_verifies(make, capsys):
+def test_untouched_program_verifies(make, run):
     made = make()
     report = made.verified()
     assert report.ok
     assert report.motions == report.intended == len(made.targets)
     assert report.max_deviation_mm <= 0.001
-    with pytest.raises(SystemExit) as leaving:
-        main(["verify", str(made.src), str(made.part)])
-    assert leaving.value.code == 0
-    assert "agrees" in capsys.readouterr().out
+    assert "agrees" in run("verify", made.src, made.part, code=0).out
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.7, 0.9, 0.99])
