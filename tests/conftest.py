@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl import load_cell
+from gcode2krl import load_cell, predict
 from gcode2krl.cli.main import _run
 from gcode2krl.files.output import Staging
 
@@ -115,3 +115,17 @@ def written_programs_are_krl(monkeypatch):
 def cell():
     """The default cell."""
     return load_cell()
+
+
+@pytest.fixture
+def part(request, tmp_path):
+    """The program ``PART`` of the module, as part.nc in the folder where commands run."""
+    file = tmp_path / "part.nc"
+    file.write_text(request.module.PART)
+    return file
+
+
+@pytest.fixture(scope="session")
+def prediction():
+    """The prediction of the test piece under the default cell."""
+    return predict(ROOT / "examples" / "test_piece.nc")

@@ -27,14 +27,6 @@ M30
 """
 
 
-@pytest.fixture
-def part(tmp_path):
-    """The part as part.nc in the folder where commands run."""
-    file = tmp_path / "part.nc"
-    file.write_text(PART)
-    return file
-
-
 def hidden(folder):
     return [file.name for file in folder.rglob("*") if file.suffix in (".part", ".old")]
 

@@ -12,10 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from gcode2krl import Gcode2KrlError, Issue, predict
+from gcode2krl import Gcode2KrlError, Issue
 from gcode2krl.exchange import ColumnFrame, Findings, unit_of
 from gcode2krl.exchange.views import VIEWS, view
-from tests.conftest import ROOT
 
 STAGES = ("toolpath", "targets", "motion", "joints", "forces", "deflection")
 UNITS = {
@@ -40,11 +39,6 @@ UNITS = {
     "exact_stop": None,
     "tool": None,
 }
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(ROOT / "examples" / "test_piece.nc")
 
 
 @pytest.mark.parametrize(("name", "unit"), UNITS.items())

@@ -7,18 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from gcode2krl import Gcode2KrlError, predict
+from gcode2krl import Gcode2KrlError
 from gcode2krl.figures import figures_of
 from gcode2krl.prediction.plots import FIGURES, Plots
 from gcode2krl.report.drawing import look
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(ROOT / "examples" / "test_piece.nc")
 
 
 def test_every_figure_has_a_method_and_every_method_is_a_figure():
