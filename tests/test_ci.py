@@ -11,7 +11,7 @@ IN_TESTS = {
     "benchmarks/mistakes.py": "tests/test_mistakes.py",
     "benchmarks/blind/calibrate.py": "tests/benchmarks/test_gap_blind_calibrate.py",
     "benchmarks/blind/channels.py": "tests/benchmarks/test_gap_metamorphic.py",
-    "benchmarks/online_faults.py": "tests/online/test_faults.py",
+    "benchmarks/online_faults.py": "tests/online/test_plant.py",
 }
 """Benchmarks of which a test does a small part, and that test."""
 
