@@ -5,7 +5,6 @@ import shutil
 
 import pytest
 
-from gcode2krl import load_cell, predict
 from tests.conftest import ROOT
 
 PIECE = ROOT / "examples" / "test_piece.nc"
@@ -13,11 +12,6 @@ OUT_OF_REACH = (
     "G21 G90 G54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z20\nG1 Z-2 F800\nX50\nY5000\nG0 Z50\nM5\nM30\n"
 )
 NOT_GCODE = "G21 G90\nG1 X Z-2 F800\nM30\n"
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(PIECE, load_cell())
 
 
 @pytest.fixture

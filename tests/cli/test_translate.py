@@ -226,17 +226,6 @@ def test_models_check_names_the_wrong_key(run, tmp_path):
     assert "home.q_deg" in run("models", "check", "cell.toml", code=2).err
 
 
-def test_the_readme_program_runs(tmp_path, monkeypatch):
-    import re
-
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    code = re.search(r"```python\n(.*?)```", text, flags=re.S).group(1)
-    code = code.replace('"examples/', f'"{ROOT.as_posix()}/examples/')
-    monkeypatch.chdir(tmp_path)
-    exec(compile(code, "README.md", "exec"), {})
-    assert (tmp_path / "test_piece.src").exists()
-
-
 def test_the_cell_files_of_the_documents_are_valid(tmp_path):
     import re
 
