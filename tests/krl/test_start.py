@@ -1,4 +1,4 @@
-"""How a program begins: exact stops at both ends of the predicted motion, who applied the lengths of tools."""
+"""How a program begins: exact stops at both ends of the motion, who applied the lengths of tools."""
 
 from dataclasses import replace
 
