@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gcode2krl import load_cell
+from gcode2krl import load_cell, predict
 from gcode2krl.cli.main import _run
 from gcode2krl.files.output import Staging
 
@@ -67,15 +67,16 @@ class Outcome:
 
 @pytest.fixture
 def run(capfd, tmp_path, monkeypatch):
-    """Run ``gcode2krl`` with arguments, in an empty folder; returns code, output and findings."""
+    """Run ``gcode2krl`` in an empty folder; returns code (which must be ``code``), output and findings."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GCODE2KRL_CACHE", str(tmp_path / "cache"))
 
-    def run_command(*arguments):
+    def run_command(*arguments, code=None):
         capfd.readouterr()
-        code = _run([str(argument) for argument in arguments])
+        found = _run([str(argument) for argument in arguments])
         out, err = capfd.readouterr()
-        return Outcome(code, out, err)
+        assert code in (None, found), err
+        return Outcome(found, out, err)
 
     return run_command
 
@@ -114,3 +115,17 @@ def written_programs_are_krl(monkeypatch):
 def cell():
     """The default cell."""
     return load_cell()
+
+
+@pytest.fixture
+def part(request, tmp_path):
+    """The program ``PART`` of the module, as part.nc in the folder where commands run."""
+    file = tmp_path / "part.nc"
+    file.write_text(request.module.PART)
+    return file
+
+
+@pytest.fixture(scope="session")
+def prediction():
+    """The prediction of the test piece under the default cell."""
+    return predict(ROOT / "examples" / "test_piece.nc")

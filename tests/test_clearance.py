@@ -55,13 +55,6 @@ def cell_with(*obstacles, **more):
     return over_demonstration({"obstacle": list(obstacles), "spindle": spindle, **more})
 
 
-@pytest.fixture
-def part(tmp_path):
-    file = tmp_path / "part.nc"
-    file.write_text(PART)
-    return file
-
-
 def contacts(part, cell, code="collision"):
     issues = predict(part, cell, forces=False).issues
     return [issue for issue in issues if issue.code == code]

@@ -31,13 +31,6 @@ def cell_with(obstacles, retract_mm):
     return over_demonstration({"obstacle": obstacles, "online": {"link": link}})
 
 
-@pytest.fixture
-def part(tmp_path):
-    file = tmp_path / "part.nc"
-    file.write_text(PART)
-    return file
-
-
 def beam(part):
     """A bar 40 mm above the arm where the tool is farthest from start and end of the cut."""
     cell = cell_with([], AWAY_MM)

@@ -82,9 +82,7 @@ def test_between_blocks_the_tool_turns_as_the_table_does():
 
 
 def test_the_example_is_translated_with_forces(run, tmp_path):
-    done = run(PART, "--cell", CELL, "-o", "part.src")
-    assert done.code == 0, done.err
-    assert "not predicted" not in done.err
+    assert "not predicted" not in run(PART, "--cell", CELL, "-o", "part.src", code=0).err
     head = (tmp_path / "part.src").read_text().split(";ENDFOLD")[0]
     assert "material removal (rapids through stock" not in head
     assert run("verify", "part.src", PART, "--cell", CELL).code == 0
@@ -100,16 +98,14 @@ def measured(tmp_path):
 
 @pytest.mark.parametrize("asked", [["--pilot", "index"], ["--pilot", "values"], ["--compensate", "offline"]])
 def test_a_turning_axis_has_a_pilot_force_and_a_correction(run, tmp_path, measured, asked):
-    done = run(PART, "--cell", measured, "-o", "part.src", *asked)
-    assert done.code == 0, done.err
+    run(PART, "--cell", measured, "-o", "part.src", *asked, code=0)
     assert "$SEN_P" in (tmp_path / "part.src").read_text()
     checked = asked if asked[0] == "--compensate" else []
     assert run("verify", "part.src", PART, "--cell", measured, *checked).code == 0
 
 
 def test_a_wide_band_refuses_the_correction_of_a_turning_axis_too(run, tmp_path):
-    done = run(PART, "--cell", CELL, "-o", "part.src", "--compensate", "offline")
-    assert done.code == 1
+    done = run(PART, "--cell", CELL, "-o", "part.src", "--compensate", "offline", code=1)
     assert "[compensation-unsure]" in done.err
     assert not (tmp_path / "part.src").exists()
 
@@ -122,8 +118,7 @@ def test_an_edited_correction_is_noticed(run, tmp_path, measured):
     for group, by in ((1, 0.05), (5, 0.2)):
         value = f"{float(found[group]) + by:.4f}"
         (tmp_path / "part.src").write_text(text[: found.start(group)] + value + text[found.end(group) :])
-        done = run("verify", "part.src", PART, "--cell", measured, "--compensate", "offline")
-        assert done.code == 1
+        run("verify", "part.src", PART, "--cell", measured, "--compensate", "offline", code=1)
 
 
 def test_predict_has_forces_and_says_what_is_less_sure():

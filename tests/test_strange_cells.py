@@ -151,16 +151,10 @@ def test_memory_of_a_parent_is_not_counted():
     assert float(done.stdout) < 500.0
 
 
-def test_the_dump_of_the_demonstration_is_a_cell_of_its_own(tmp_path):
-    from click.testing import CliRunner
-
-    from gcode2krl.cli.main import commands
-
-    shown = CliRunner().invoke(commands, ["models", "show", "kr300_demonstration"]).output
+def test_the_dump_of_the_demonstration_is_a_cell_of_its_own(run, tmp_path):
     path = tmp_path / "cell.toml"
-    path.write_text(shown)
-    confirm = ["models", "confirm", str(path), "--by", "A", "--yes"]
-    assert CliRunner().invoke(commands, confirm).exit_code == 0
+    path.write_text(run("models", "show", "kr300_demonstration", code=0).out)
+    run("models", "confirm", path, "--by", "A", "--yes", code=0)
     cell = load_cell(path)
     assert cell.is_confirmed
     assert not cell.taken_over

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gcode2krl import robot
-from gcode2krl.canned import NAMES, draft_of, gcode_of, minutes_of, place_of, predicted, targets_of
-from gcode2krl.canned.catalogue import PROGRAMS, WEIGHT_N
+from gcode2krl.canned import NAMES, REPEAT, draft_of, gcode_of, minutes_of, place_of, predicted, targets_of
+from gcode2krl.canned.catalogue import PROGRAMS, SPINDLE_SHARES, WEIGHT_N
 from gcode2krl.canned.draft import DIAGONAL, GESTURE_MM, REFERENCES
+from gcode2krl.canned.trial import trials_of
 from gcode2krl.cell import load_cell
 from gcode2krl.cli import make_test
 from gcode2krl.errors import NotUnderstoodError, RefusedError
@@ -70,12 +71,9 @@ def test_a_program_stays_in_its_air(name):
 def test_both_forms_are_written_verified_and_translate(run, tmp_path, name, form):
     part = [str(make_part(tmp_path))] if PROGRAMS[name].takes_part else []
     file = f"test.{form}"
-    made = run("make-test", name, *part, "-o", file)
-    assert made.code == 0, made.err
-    assert "min" in made.out
+    assert "min" in run("make-test", name, *part, "-o", file, code=0).out
     if form == "nc":
-        translated = run(file, "-o", "other.src")
-        assert translated.code == 0, translated.err
+        run(file, "-o", "other.src", code=0)
         file = "other.src"
     text = (tmp_path / file).read_text("ascii")
     assert text.index("PTP") < text.index("LIN")
@@ -224,3 +222,49 @@ def test_turns_are_checked_like_everything_else():
     assert np.isfinite(joints.q_rad).all()
     lever = robot.jacobian(joints.q_rad[3:4], CELL, 1)[0, :3, 0]
     assert np.linalg.norm(lever) > 500.0
+
+
+TRIALS = {trial.name: trial for trial in trials_of(CELL)}
+
+
+def test_every_program_but_the_repetition_can_be_tried():
+    assert set(TRIALS) == set(PROGRAMS) - {REPEAT}
+    assert trials_of(CELL) is trials_of(load_cell())  # remembered
+
+
+@pytest.mark.parametrize("name", sorted(TRIALS))
+def test_a_trial_is_whole(name):
+    inputs = TRIALS[name].inputs
+    assert np.isfinite(inputs.q_cmd_rad).all()
+    assert (np.diff(inputs.time_s) > 0.0).all()
+    assert TRIALS[name].minutes >= inputs.time_s[-1] / 60.0
+    assert len(inputs) < 6000
+
+
+def test_weights_pull_only_while_the_robot_stands():
+    inputs = TRIALS["weights"].inputs
+    pulled = np.linalg.norm(inputs.force_base_N, axis=1) > 0.0
+    assert set(np.round(np.linalg.norm(inputs.force_base_N[pulled], axis=1))) == {WEIGHT_N}
+    step_mm = np.linalg.norm(np.diff(inputs.position_mm, axis=0), axis=1)
+    assert step_mm[pulled[1:] & pulled[:-1]].max() < 1e-9
+    directions = {tuple(row) for row in np.round(inputs.force_base_N[pulled] / WEIGHT_N)}
+    assert len(directions) == 3
+    seconds = pulled.sum() * np.median(np.diff(inputs.time_s))
+    assert seconds == pytest.approx(3 * 3 * 10.0, rel=0.05)
+    assert inputs.deflection_mm[pulled].any(axis=1).all()
+
+
+def test_the_spindle_turns_at_its_four_speeds_and_then_stands():
+    inputs = TRIALS["spindle"].inputs
+    rpm = np.round(inputs.spindle_rad_s * 60.0 / (2.0 * np.pi))
+    most = place_of(CELL).most_rpm
+    assert set(rpm) == {0.0, *(share * most for share in SPINDLE_SHARES)}
+    assert rpm[0] == rpm[-1] == 0.0
+    step_s = np.median(np.diff(inputs.time_s))
+    for share in SPINDLE_SHARES:
+        assert (rpm == share * most).sum() * step_s == pytest.approx(20.0, rel=0.05)
+    assert draft_of("spindle", place_of(CELL)).starts == 2 * len(SPINDLE_SHARES)
+
+
+def test_what_cannot_run_is_left_out():
+    assert trials_of(CELL.model_copy(update={"mounted_tool": None})) == ()

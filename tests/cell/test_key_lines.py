@@ -1,4 +1,4 @@
-"""The line of each key of a TOML file, against files whose every value is the number of its line."""
+"""The keys of a TOML file: the line of each, and the one that is meant by a mistyped one."""
 
 import re
 import time
@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import load_cell
+from gcode2krl.cell import Cell, resolve_cell
 from gcode2krl.cell.key_lines import lines_of_keys, with_lines
+from gcode2krl.cell.loading import meant_key
 from gcode2krl.errors import Issue, NotUnderstoodError
 from tests.conftest import ROOT
 
@@ -151,7 +153,39 @@ def test_findings_in_cells_carry_their_line(tmp_path, run):
 def test_warnings_of_the_check_carry_their_line(tmp_path, run):
     text = 'name = "a"\n[load]\nmass_kg = 1500.0\n[m_code]\nM10 = """\nHALT\nLIN {X 1}"""\n'
     (tmp_path / "cell.toml").write_text(text, encoding="utf-8")
-    done = run("models", "check", "cell.toml")
-    assert done.code == 1
+    done = run("models", "check", "cell.toml", code=1)
     assert "cell.toml:3: warning: load.mass_kg = 1500" in done.err
     assert "cell.toml:5: error: m_code.M10" in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("clearance = {z = 100.0}", "clearance.z_mm"),
+        ("[tool.1]\ndiameter = 6.0", "tool.1.diameter_mm"),
+        ("[controler]\nrapid_m_s = 1.0", "controller"),
+        ("[limits]\nforce_n = 300.0", "limits.force_N"),
+        ("[pilot]\ntolerance = 3.0", "pilot.tolerance_N"),
+        ("[program]\ntool_lenght = 'g43'", "program.tool_length"),
+        ("[online.link]\nrobot_adress = '1.2.3.4'", "online.link.robot_address"),
+        ("[[guard_inputs]]\nnumbr = 3", "guard_inputs.0.number"),
+    ],
+)
+def test_the_remedy_names_the_nearest_key(tmp_path, text, meant):
+    file = tmp_path / "cell.toml"
+    file.write_text(f'based_on = "demonstration"\n{text}\n', "utf-8")
+    with pytest.raises(NotUnderstoodError) as raised:
+        load_cell(file)
+    unknown = [issue for issue in raised.value.issues if "there is no such key" in issue.message]
+    assert [issue.remedy.split("?")[0] for issue in unknown] == [f"did you mean {meant}"]
+
+
+@pytest.mark.parametrize("place", [("xyzzy",), ("defaultss",), ("tool", "1", "qqqqqq"), ("a", "b", "c")])
+def test_what_is_near_to_nothing_is_answered_with_nothing(place):
+    assert meant_key(Cell, place) == ""
+
+
+def test_a_long_text_is_not_quoted_whole():
+    with pytest.raises(NotUnderstoodError) as error:
+        resolve_cell({"online": {"link": {"address": "a" * 5000}}})
+    assert len(str(error.value)) < 300

@@ -342,21 +342,16 @@ def test_models_check_lists_what_is_switched_missing_and_taken_over(run, tmp_pat
     assert taken["load.mass_kg"] == "demonstration"
     assert "m_code.M8" not in taken
     write(tmp_path / "own.toml", "[tool.1]\ndiameter_mm = 10.0\nteeth = 2\n")
-    done = run("models", "check", "own.toml")
-    assert done.code == 0
+    done = run("models", "check", "own.toml", code=0)
     for key in ("robot.model", "frames.base", "home.q_deg", "load.mass_kg", "tool.1.length_mm", "m_code.M5"):
         assert f"MISSING: {key}" in done.out
 
 
-@pytest.mark.parametrize("command", ["translate", "predict"])
-def test_a_cell_that_lacks_values_is_refused_with_code_1(run, tmp_path, command):
+@pytest.mark.parametrize(("command", "out"), [("translate", "out.src"), ("predict", "out")])
+def test_a_cell_that_lacks_values_is_refused_with_code_1(run, tmp_path, command, out):
     write(tmp_path / "part.nc", PART)
     write(tmp_path / "cell.toml", "[tool.1]\ndiameter_mm = 10.0\nteeth = 2\nlength_mm = 80.0\n")
-    done = run(
-        command, "part.nc", "--cell", "cell.toml", "-o", "out" + (".src" if command == "translate" else "")
-    )
-    assert done.code == 1
-    assert "frames.base" in done.err
+    assert "frames.base" in run(command, "part.nc", "--cell", "cell.toml", "-o", out, code=1).err
     assert not (tmp_path / "out.src").exists()
 
 

@@ -109,8 +109,7 @@ def test_no_code_and_no_files_under_any_command(run, tmp_path, template):
     """Under translate, predict and verify, also through the cell in a prediction's folder."""
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
     cell_with(tmp_path, template)
-    done = run("translate", "part.nc", "--cell", "cell.toml", "-o", "out.src", "--no-forces")
-    assert done.code == 1, done.err
+    done = run("translate", "part.nc", "--cell", "cell.toml", "-o", "out.src", "--no-forces", code=1)
     assert "m_code.M8 of the cell" in done.err
     assert "correct m_code.M8 in the cell file" in done.err
     (tmp_path / "out.src").write_text("DEF OUT( )\nEND\n", encoding="ascii")

@@ -171,9 +171,7 @@ def test_tools_become_sections_of_a_cell_and_the_program_is_written(library, run
     (tmp_path / "part.nc").write_text(
         GOOD.format(x=50).replace("T1", "T4001").replace("H1", "H4001"), encoding="ascii"
     )
-    refused = run("part.nc", "--cell", "cell.toml", "-o", "PART.src")
-    assert refused.code == 1
-    assert "gcode2krl tools import" in refused.err
+    assert "gcode2krl tools import" in run("part.nc", "--cell", "cell.toml", "-o", "PART.src", code=1).err
     numbered = json.loads(library.read_text(encoding="utf-8"))
     numbered["data"][0]["post-process"]["number"] = 4001
     library.write_text(json.dumps(numbered), encoding="utf-8")
@@ -184,11 +182,8 @@ def test_tools_become_sections_of_a_cell_and_the_program_is_written(library, run
 def test_what_the_cell_has_stays_and_a_difference_is_told(library, run, tmp_path):
     mine = CELL + "\n[tool.1]\ndiameter_mm = 8\nteeth = 2\nlength_mm = 80\n"
     (tmp_path / "cell.toml").write_text(mine, encoding="utf-8")
-    outcome = run(
-        "tools", "import", library, "--cell", "cell.toml", "--only", "1,4003", "--set", "4003.length_mm=101.5"
-    )
-    assert outcome.code == 0
-    assert "tool-differs" in outcome.err
+    words = ("--cell", "cell.toml", "--only", "1,4003", "--set", "4003.length_mm=101.5")
+    assert "tool-differs" in run("tools", "import", library, *words, code=0).err
     text = (tmp_path / "cell.toml").read_text(encoding="utf-8")
     assert text.startswith(mine)
     assert "length_mm = 101.5" in text
@@ -197,11 +192,8 @@ def test_what_the_cell_has_stays_and_a_difference_is_told(library, run, tmp_path
 
 def test_a_cell_that_would_be_wrong_is_left_as_it_is(library, run, tmp_path):
     (tmp_path / "cell.toml").write_text(CELL, encoding="utf-8")
-    outcome = run(
-        "tools", "import", library, "--cell", "cell.toml", "--only", "4003", "--set", "4003.length_mm=5"
-    )
-    assert outcome.code == 2
-    assert "shorter than the flutes" in outcome.err
+    words = ("--cell", "cell.toml", "--only", "4003", "--set", "4003.length_mm=5")
+    assert "shorter than the flutes" in run("tools", "import", library, *words, code=2).err
     assert (tmp_path / "cell.toml").read_text(encoding="utf-8") == CELL
 
 

@@ -1,6 +1,5 @@
 """``gcode2krl batch``: what is written, what a second run computes, what a killed worker and Ctrl-C cost."""
 
-import contextlib
 import hashlib
 import json
 import os
@@ -18,6 +17,7 @@ import trimesh
 from gcode2krl.batch import results
 from gcode2krl.batch.cache import FOLDER_VARIABLE
 from gcode2krl.result.model import Record
+from tests.cli import on_a_terminal
 from tests.conftest import HEEDS_CTRL_C, ROOT
 
 HEAD = "G21 G90 G17\nT1 M6\nS8000 M3\nG0 X0 Y0 Z20\nG43 H1 Z20\n"
@@ -95,8 +95,7 @@ def test_a_record_has_what_a_page_needs(parts, run):
 def test_a_bad_part_does_not_stop_the_others(parts, run):
     (parts / "far.nc").write_text(REFUSED)
     (parts / "no.nc").write_text(NOT_UNDERSTOOD)
-    done = run("batch", parts, "-o", "out")
-    assert done.code == 1
+    done = run("batch", parts, "-o", "out", code=1)
     assert {part: record["exit_code"] for part, record in records("out").items()} == {
         "a.nc": 0,
         "b.NGC": 0,
@@ -210,17 +209,14 @@ def test_a_program_that_is_refused_now_does_not_stay(parts, run):
 
 def test_collisions_are_refused_before_anything_is_computed(parts, run):
     (parts / "A.ngc").write_text(GOOD.format(x=1))
-    done = run("batch", parts, "-o", "out")
-    assert done.code == 2
+    done = run("batch", parts, "-o", "out", code=2)
     assert "A.ngc" in done.err
     assert "a.nc" in done.err
     assert not (Path("out") / "results.jsonl").exists()
 
 
 def test_an_output_folder_without_a_parent_is_refused(parts, run):
-    done = run("batch", parts, "-o", "no/where")
-    assert done.code == 2
-    assert "output-unwritable" in done.err
+    assert "output-unwritable" in run("batch", parts, "-o", "no/where", code=2).err
 
 
 def test_the_cell_of_each_folder(parts, run, tmp_path):
@@ -240,9 +236,7 @@ def test_the_cell_of_each_folder(parts, run, tmp_path):
 
 def test_a_wrong_cell_ends_the_batch(parts, run, tmp_path):
     (tmp_path / "cell.toml").write_text("[robot]\nmodle = 1\n")
-    done = run("batch", parts, "-o", "out", "--cell", "cell.toml")
-    assert done.code == 2
-    assert "robot.modle" in done.err
+    assert "robot.modle" in run("batch", parts, "-o", "out", "--cell", "cell.toml", code=2).err
 
 
 def test_json_and_quiet(parts, run):
@@ -286,31 +280,16 @@ def test_the_cache_is_shown_and_cleared(parts, run, tmp_path):
 
 
 def test_several_parts_for_translate_name_the_batch(parts, run):
-    done = run(parts / "a.nc", parts / "b.NGC")
-    assert done.code == 2
-    assert "gcode2krl batch PARTS -o out/" in done.err
+    assert "gcode2krl batch PARTS -o out/" in run(parts / "a.nc", parts / "b.NGC", code=2).err
     assert "batch" not in run(parts / "a.nc", "--nonsense").err
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal")
 def test_on_a_terminal_the_lines_stand_above_one_bar(parts, tmp_path):
-    import pty
-
-    ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "gcode2krl", "batch", str(parts), "-o", "out"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
-    process = subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=theirs
-    )
-    os.close(theirs)
-    shown = b""
-    with contextlib.suppress(OSError):  # the end of a pseudo-terminal on Linux
-        while piece := os.read(ours, 65536):
-            shown += piece
-    os.close(ours)
-    assert process.wait(60) == 0
-    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode("utf-8"))
+    code, shown, _ = on_a_terminal(tmp_path, "batch", parts, "-o", "out", stdout=subprocess.DEVNULL)
+    assert code == 0
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)
     lines = [line for line in re.split(r"[\r\n]+", plain) if "written" in line]
     assert len(lines) == 3
     assert all(line.startswith("written ") for line in lines)

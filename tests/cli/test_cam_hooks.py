@@ -61,8 +61,7 @@ def test_the_filter_writes_a_program_or_nothing_and_findings_beside_it(text, cod
 def test_a_job_changes_the_prediction_and_not_where_the_tip_is(run, tmp_path):
     (tmp_path / "part.nc").write_text(GOOD, encoding="ascii")
     (tmp_path / "job.toml").write_text(JOB, encoding="utf-8")
-    done = run("predict", "part.nc", "--job", "job.toml", "-o", "under")
-    assert done.code == 0, done.err
+    done = run("predict", "part.nc", "--job", "job.toml", "-o", "under", code=0)
     assert "T1 is a ball cutter of 10 mm in the job and flat of 16 mm in the cell" in done.err
     assert run("predict", "part.nc", "-o", "plain").code == 0
     under, plain = Prediction.load(tmp_path / "under"), Prediction.load(tmp_path / "plain")

@@ -1,14 +1,13 @@
 """`gcode2krl models confirm`: who is asked what, and what is written."""
 
 import json
-import os
-import subprocess
 import sys
 
 import pytest
 
 from gcode2krl import load_cell
 from gcode2krl.cell.fingerprint import values_by_section
+from tests.cli import on_a_terminal
 from tests.conftest import ROOT
 
 SOURCE = ROOT / "examples" / "cells" / "spindle_on_analog_output.toml"
@@ -36,8 +35,7 @@ def cell_file(tmp_path):
     ],
 )
 def test_nothing_is_confirmed_by_nobody(run, cell_file, words, told):
-    done = run(*CONFIRM, *words)
-    assert done.code == 2
+    done = run(*CONFIRM, *words, code=2)
     assert told in done.err
     assert "-> " in done.err
     assert cell_file.read_bytes() == SOURCE.read_bytes()
@@ -51,8 +49,7 @@ def test_a_script_confirms_what_a_person_has_compared(run, cell_file):
     signed = cell_file.read_bytes()
     assert run(*CONFIRM, "--by", "B", "--yes").out.count("as it was confirmed") == 1
     assert cell_file.read_bytes() == signed
-    done = run("models", "check", "cell.toml")
-    assert "verified by A on 2026-11-28" in done.out
+    assert "verified by A on 2026-11-28" in run("models", "check", "cell.toml").out
     cell_file.write_bytes(signed.replace(b"z_mm = 150.0", b"z_mm = 151.0", 1))
     done = run("models", "check", "cell.toml")
     assert "NOT VERIFIED" in done.out
@@ -77,15 +74,13 @@ def test_a_section_that_is_gone_is_asked_for(run, cell_file):
 
 def test_a_cell_with_an_error_is_not_confirmed(run, cell_file):
     cell_file.write_text(cell_file.read_text().replace("mass_kg = 42.0", "mass_kg = 4e6"))
-    done = run(*CONFIRM, "--by", "A", "--yes")
-    assert done.code == 2
+    run(*CONFIRM, "--by", "A", "--yes", code=2)
     assert "[verified]" not in cell_file.read_text()
 
 
 def test_what_is_taken_over_is_not_covered(run, tmp_path):
     (tmp_path / "cell.toml").write_text('based_on = "demonstration"\n[clearance]\nz_mm = 120.0\n')
-    done = run(*CONFIRM, "--by", "A", "--yes")
-    assert "NOT COVERED" in done.out
+    assert "NOT COVERED" in run(*CONFIRM, "--by", "A", "--yes").out
     cell = load_cell(tmp_path / "cell.toml")
     assert (cell.unconfirmed, cell.is_confirmed) == ((), False)
 
@@ -114,21 +109,6 @@ def test_a_person_is_asked_section_by_section(cell_file, shown, is_this):
 
 def at_terminal(cell_file, answers):
     """Run the command with a person who types these lines; return what the terminal shows, and the code."""
-    import pty
-
-    master, slave = pty.openpty()
-    command = [sys.executable, "-m", "gcode2krl", "models", "confirm", str(cell_file)]
-    with subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, close_fds=True) as process:
-        os.close(slave)
-        os.write(master, "".join(f"{answer}\n" for answer in answers).encode())
-        output = b""
-        while True:
-            try:
-                part = os.read(master, 65536)
-            except OSError:  # the other end is closed
-                break
-            if not part:
-                break
-            output += part
-    os.close(master)
-    return output.decode().replace("\r\n", "\n"), process.returncode
+    typed = "".join(f"{answer}\n" for answer in answers)
+    code, shown, _ = on_a_terminal(cell_file.parent, "models", "confirm", cell_file, typed=typed)
+    return shown, code

@@ -60,9 +60,7 @@ def test_an_example_leaves_only_confirmations_and_translates(run, cell):
     assert (done.code, checked["valid"], checked["verified"]) == (0, True, False)
     assert (checked["missing"], checked["taken_over"], checked["issues"]) == ([], [], [])
     assert not [row for row in checked["confirm"] if "MISSING" in row["value"]]
-    translated = run(FOLDER / "part.nc", "--cell", cell, "-o", "part.src")
-    assert translated.code == 0, translated.err
-    assert "warning" not in translated.err
+    assert "warning" not in run(FOLDER / "part.nc", "--cell", cell, "-o", "part.src", code=0).err
 
 
 def test_the_spindles_are_switched_as_the_cells_say(run, tmp_path):
@@ -159,8 +157,7 @@ def test_an_answer_that_is_wrong_is_named_with_its_line(run, tmp_path, line, cha
     lines = (FOLDER / "answers" / "upside_down.toml").read_text(encoding="utf-8").split("\n")
     lines[line - 1] = changed
     (tmp_path / "answers.toml").write_text("\n".join(lines), encoding="utf-8")
-    done = run("init", "--answers", "answers.toml")
-    assert done.code == 2
+    done = run("init", "--answers", "answers.toml", code=2)
     assert not (tmp_path / "cell.toml").exists()
     for word in words:
         assert word in done.err
@@ -183,8 +180,7 @@ def test_what_nobody_answers_is_left_out_and_named(run, tmp_path):
         'tool_change = "none"\nspindle_speed = "drive"\n[[tools]]\nnumber = 1\nmodel = "flat 6 z3"\n',
         encoding="ascii",
     )
-    done = run("init", "--answers", "answers.toml", "--json")
-    missing = json.loads(done.out)["missing"]
+    missing = json.loads(run("init", "--answers", "answers.toml", "--json").out)["missing"]
     assert {"frames.base", "home.q_deg", "clearance.z_mm", "frames.tool", "load.mass_kg"} <= set(missing)
     text = (tmp_path / "cell.toml").read_text(encoding="utf-8")
     stated = tomllib.loads(text)
@@ -271,8 +267,7 @@ def test_an_archive_is_read_back_to_the_same_cell(run, tmp_path, name):
     lines = (FOLDER / "answers" / f"{name}.toml").read_text(encoding="utf-8").split("\n")
     left = [line for line in lines if line.partition(" ")[0] not in (*OF_ARCHIVE, "reference_frame", "frame")]
     (tmp_path / "answers.toml").write_text("\n".join(left), encoding="utf-8")
-    done = run("init", "--controller", "archive.zip", "--answers", "answers.toml")
-    assert done.code == 0, done.err
+    run("init", "--controller", "archive.zip", "--answers", "answers.toml", code=0)
     ours, theirs = load_cell(tmp_path / "cell.toml"), load_cell(FOLDER / f"{name}.toml")
     if name == "spindle_on_digital_output":  # its base has no number: the archive has no entry for it
         assert ours.frames.base is None
@@ -300,8 +295,7 @@ def test_enter_accepts_what_the_archive_states(tmp_path, name):
 def test_an_archive_of_another_arm_is_refused(run, tmp_path):
     archive_of(tmp_path / "archive.zip", "tool_magazine")
     answers = FOLDER / "answers" / "upside_down.toml"
-    done = run("init", "--controller", "archive.zip", "--answers", answers)
-    assert done.code == 2
+    done = run("init", "--controller", "archive.zip", "--answers", answers, code=2)
     assert "robot: found 'KR 60 HA', allowed: KR 300 R2500 ultra" in done.err
 
 
@@ -322,8 +316,7 @@ def test_a_robot_that_is_not_in_the_library_comes_from_the_archive(run, tmp_path
     write_zip(tmp_path / "archive.zip", config, machine_dat(strange, "#KR240R3330 C4 FLR"))
     text = (FOLDER / "answers" / f"{name}.toml").read_text(encoding="utf-8")
     (tmp_path / "answers.toml").write_text(text.replace('"KR 240 R2900-2"', '"other"'), encoding="utf-8")
-    done = run("init", "--controller", "archive.zip", "--answers", "answers.toml")
-    assert done.code == 0, done.err
+    run("init", "--controller", "archive.zip", "--answers", "answers.toml", code=0)
     robot = load_cell(tmp_path / "cell.toml").robot
     assert (robot.model, robot.trafo_name, robot.geometry.c3_mm) == ("", "KR240R3330 C4 FLR", 1345.0)
     assert robot.limits.q_deg == cell.robot.limits.q_deg
@@ -415,8 +408,7 @@ def test_an_arm_of_no_library_needs_two_commands(run, tmp_path, monkeypatch, of_
     robot = load_cell(tmp_path / "cell.toml").robot
     assert (robot.title, robot.geometry.c3_mm, robot.payload.reach_mm) == (LONG_ARM, 1950.0, 3901.0)
     (tmp_path / "part.nc").write_text(PART, "utf-8")
-    done = run("part.nc", "--cell", "cell.toml", "-o", "part.src")
-    assert done.code == 0, done.err
+    done = run("part.nc", "--cell", "cell.toml", "-o", "part.src", code=0)
     assert f"robot      {LONG_ARM}, status S" in done.out
     assert (tmp_path / "part.src").exists()
 
@@ -429,9 +421,7 @@ def test_an_arm_that_nobody_names_is_called_so(run, tmp_path):
 
 def test_lengths_that_do_not_give_the_reach_are_refused(run, tmp_path):
     answers_file(tmp_path, DATA_SHEET.replace("1950.0", "1590.0"))
-    done = run("init", "--answers", "answers.toml")
-    assert done.code == 2
-    assert "the lengths reach" in done.err
+    assert "the lengths reach" in run("init", "--answers", "answers.toml", code=2).err
     assert not (tmp_path / "cell.toml").exists()
 
 
@@ -445,8 +435,7 @@ def test_a_robot_file_may_be_named(run, tmp_path):
         if not line.startswith(("lengths", "reach", "payload", "robot"))
     ]
     answers_file(tmp_path, 'robot = "my.toml"\n' + "\n".join(lines) + "\n")
-    done = run("init", "--answers", "answers.toml")
-    assert done.code == 0, done.err
+    run("init", "--answers", "answers.toml", code=0)
     assert load_cell(tmp_path / "cell.toml").robot.model == "KR 210-2"
 
 

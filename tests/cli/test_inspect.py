@@ -57,6 +57,4 @@ def test_what_is_no_program_gets_its_one_sentence(run, tmp_path):
 
 def test_for_a_person_it_is_lines_of_text(run, tmp_path):
     (tmp_path / "part.nc").write_text(FANUC + CUT)
-    outcome = run("inspect", tmp_path / "part.nc")
-    assert outcome.code == 0
-    assert "X -5..40, Y 0..0, Z -1..30 mm" in outcome.out
+    assert "X -5..40, Y 0..0, Z -1..30 mm" in run("inspect", tmp_path / "part.nc", code=0).out

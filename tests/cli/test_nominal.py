@@ -23,9 +23,7 @@ def folder(run, tmp_path):
 
 
 def test_findings_figures_and_files(run, folder):
-    done = run(*WORDS, "--json")
-    assert done.code == 0, done.err
-    result = json.loads(done.out)
+    result = json.loads(run(*WORDS, "--json", code=0).out)
     gouge, rest = result["nominal"]["differences"]
     assert (gouge["kind"], rest["kind"]) == ("gouge", "rest")
     assert gouge["depth_mm"] == pytest.approx(1.5, abs=0.01)
@@ -56,8 +54,7 @@ def test_the_report_shows_them_if_the_part_is_unchanged(run, folder):
     assert run("report", "prediction", "-o", "report.html").code == 0
     assert "Against the nominal part" in (folder / "report.html").read_text(encoding="utf-8")
     (folder / "nominal.stl").rename(folder / "elsewhere.stl")
-    done = run("report", "prediction", "-o", "report.html")
-    assert "nominal.stl is not at hand" in done.err
+    assert "nominal.stl is not at hand" in run("report", "prediction", "-o", "report.html").err
     assert "Against the nominal part" not in (folder / "report.html").read_text(encoding="utf-8")
     assert run("report", "prediction", "-o", "report.html", "--nominal", "elsewhere.stl").code == 0
     assert "Against the nominal part" in (folder / "report.html").read_text(encoding="utf-8")
@@ -95,13 +92,10 @@ def test_a_part_that_cannot_be_read(run, folder, content, sentence):
         (folder / "nominal.stl").unlink()
     else:
         (folder / "nominal.stl").write_bytes(content)
-    done = run(*WORDS)
-    assert done.code == 2
-    assert sentence in done.err
+    assert sentence in run(*WORDS, code=2).err
     assert not (folder / "prediction").exists()
 
 
 def test_the_nominal_part_is_never_written_over(run, folder):
     (folder / "prediction").mkdir()
-    done = run("predict", "slot.nc", "-o", "prediction", "--nominal", "prediction/rest.stl")
-    assert done.code == 2
+    run("predict", "slot.nc", "-o", "prediction", "--nominal", "prediction/rest.stl", code=2)

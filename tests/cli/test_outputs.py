@@ -27,14 +27,6 @@ M30
 """
 
 
-@pytest.fixture
-def part(tmp_path):
-    """The part as part.nc in the folder where commands run."""
-    file = tmp_path / "part.nc"
-    file.write_text(PART)
-    return file
-
-
 def hidden(folder):
     return [file.name for file in folder.rglob("*") if file.suffix in (".part", ".old")]
 
@@ -68,8 +60,7 @@ BAD = {
 
 @pytest.mark.parametrize("stem", BAD)
 def test_an_output_that_a_controller_would_not_take_is_refused(run, part, tmp_path, stem):
-    done = run("part.nc", "-o", f"{stem}.src")
-    assert done.code == 2
+    done = run("part.nc", "-o", f"{stem}.src", code=2)
     assert "[krl-name]" in done.err
     assert f"-o {BAD[stem]}.src" in done.err
     assert len(done.err.splitlines()) == 1
@@ -81,8 +72,7 @@ def test_a_derived_name_is_one_that_a_controller_takes(run, part, tmp_path, stem
     folder = tmp_path / ("out" if where == "folder" else ".")
     folder.mkdir(exist_ok=True)
     part.rename(tmp_path / f"{stem}.nc")
-    done = run(f"{stem}.nc", *(["-o", "out"] if where == "folder" else []))
-    assert done.code == 0
+    done = run(f"{stem}.nc", *(["-o", "out"] if where == "folder" else []), code=0)
     name = BAD[stem]
     files = sorted(file.name for file in folder.glob(f"{name}*"))
     assert files == [f"{name}.dat", f"{name}.pilot.csv", f"{name}.src"]
@@ -105,9 +95,7 @@ def test_a_good_name_is_kept_as_it_is_written(run, part, tmp_path):
 
 
 def test_name_and_file_must_be_alike(run, part, tmp_path):
-    done = run("part.nc", "-o", "part.src", "--name", "other")
-    assert done.code == 2
-    assert "-o other.src" in done.err
+    assert "-o other.src" in run("part.nc", "-o", "part.src", "--name", "other", code=2).err
     assert list(tmp_path.glob("*.src")) == []
 
 
@@ -115,8 +103,7 @@ def test_a_subprogram_that_the_cell_calls_is_taken(run, part, tmp_path):
     (tmp_path / "cell.toml").write_text(
         'based_on = "demonstration"\n[program]\nexternals = ["SPINDLE_ON(INT :IN)"]\n'
     )
-    done = run("part.nc", "-o", "spindle_on.src", "--cell", "cell.toml")
-    assert done.code == 2
+    done = run("part.nc", "-o", "spindle_on.src", "--cell", "cell.toml", code=2)
     assert "a subprogram that the cell calls" in done.err
 
 
@@ -127,9 +114,7 @@ def test_every_suggestion_is_a_good_name(stem):
 
 
 def test_standard_input_has_no_name(run, part, tmp_path, monkeypatch):
-    done = run("-", "-o", ".")
-    assert done.code == 2
-    assert "--name PART" in done.err
+    assert "--name PART" in run("-", "-o", ".", code=2).err
 
 
 # --- no input is overwritten ------------------------------------------------------------------------------
@@ -206,8 +191,7 @@ def test_no_input_is_overwritten(run, part, tmp_path, rename, arguments):
     (tmp_path / "link.stl").symlink_to("stock.stl")
     (tmp_path / "hard.stl").hardlink_to(tmp_path / "stock.stl")
     before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
-    done = run(*arguments)
-    assert done.code == 2
+    done = run(*arguments, code=2)
     assert re.search(r"\[(output-is-input|option-value)\]", done.err), done.err
     assert len(done.err.splitlines()) == 1
     assert {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()} == before
@@ -217,9 +201,7 @@ def test_a_base_that_a_cell_names_is_an_input(run, part, tmp_path):
     (tmp_path / "base.toml").write_text(CELL.replace("stock.stl", "part.dat"))
     (tmp_path / "cell.toml").write_text('based_on = "base.toml"\n')
     (tmp_path / "part.dat").write_text(STOCK)
-    done = run("part.nc", "-o", "part.src", "--cell", "cell.toml")
-    assert done.code == 2
-    assert "[output-is-input]" in done.err
+    assert "[output-is-input]" in run("part.nc", "-o", "part.src", "--cell", "cell.toml", code=2).err
     assert (tmp_path / "part.dat").read_text() == STOCK
 
 
@@ -229,9 +211,7 @@ def test_parts_are_compared_when_they_are_written(run, tmp_path):
     (tmp_path / "LONG_002.src").write_text(PART.replace("G0 Z20\nM5", f"{moves}G0 Z20\nM5"))
     before = (tmp_path / "LONG_002.src").read_bytes()
     arguments = ("LONG_002.src", "-o", "long.src", "--max-lines", "100", "--no-forces")
-    done = run(*arguments, "--split", "files")
-    assert done.code == 2
-    assert "LONG_002.src is an input" in done.err
+    assert "LONG_002.src is an input" in run(*arguments, "--split", "files", code=2).err
     assert (tmp_path / "LONG_002.src").read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["LONG_002.src"], "all or none"
     assert run(*arguments).code == 0, "without parts there is nothing to overwrite"
@@ -244,8 +224,7 @@ def test_parts_are_compared_when_they_are_written(run, tmp_path):
 def test_a_foreign_folder_is_not_written_into(run, part, tmp_path, foreign):
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / foreign).write_text('title = "my own"\n')
-    done = run("predict", "part.nc", "-o", "folder", "--no-forces")
-    assert done.code == 2
+    done = run("predict", "part.nc", "-o", "folder", "--no-forces", code=2)
     assert "[output-foreign]" in done.err
     assert len(done.err.splitlines()) == 1
     assert [file.name for file in (tmp_path / "folder").iterdir()] == [foreign]
@@ -266,9 +245,7 @@ def test_a_prediction_that_was_not_finished_is_not_read(run, part, tmp_path):
     assert run("predict", "part.nc", "-o", "new", "--no-forces").code == 0
     record = tmp_path / "new" / "prediction.toml"
     record.write_text('schema = "gcode2krl/prediction/1"\nunfinished = true\n')
-    done = run("online", "simulate", "new")
-    assert done.code == 2
-    assert "[prediction-unfinished]" in done.err
+    assert "[prediction-unfinished]" in run("online", "simulate", "new", code=2).err
     assert run("predict", "part.nc", "-o", "new", "--no-forces").code == 0
 
 
@@ -277,17 +254,14 @@ def test_a_prediction_that_cannot_be_written_stays_as_it_was(run, part, tmp_path
     before = (tmp_path / "new" / "prediction.toml").read_bytes()
     (tmp_path / "new" / "targets.parquet").unlink()
     (tmp_path / "new" / "targets.parquet").mkdir()
-    done = run("predict", "part.nc", "-o", "new", "--no-forces")
-    assert done.code == 2
-    assert "targets.parquet" in done.err
+    assert "targets.parquet" in run("predict", "part.nc", "-o", "new", "--no-forces", code=2).err
     assert (tmp_path / "new" / "prediction.toml").read_bytes() == before
     assert hidden(tmp_path) == []
 
 
 @pytest.mark.parametrize("mesh", ["x.nc", "mesh", "left.src", "nowhere/left.stl"])
 def test_a_mesh_of_no_known_kind_is_refused_before_the_work(run, part, tmp_path, mesh):
-    done = run("predict", "part.nc", "-o", "new", "--part", mesh)
-    assert done.code == 2
+    done = run("predict", "part.nc", "-o", "new", "--part", mesh, code=2)
     assert len(done.err.splitlines()) == 1
     assert "internal" not in done.err
     assert [file.name for file in tmp_path.iterdir()] == ["part.nc"]
@@ -339,9 +313,7 @@ def test_standard_files_closed_or_full(tmp_path, part, command, code, lines):
 @pytest.mark.parametrize("name", ["part.dat", "part.pilot.csv", "part.src"])
 def test_a_folder_in_the_place_of_an_output_is_named(run, part, tmp_path, name):
     (tmp_path / name).mkdir()
-    done = run("part.nc", "-o", "part.src")
-    assert done.code == 2
-    assert done.err.startswith(f"{name}: error: this is a folder")
+    assert run("part.nc", "-o", "part.src", code=2).err.startswith(f"{name}: error: this is a folder")
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted([name, "part.nc"])
 
 
@@ -373,8 +345,7 @@ def test_one_line_and_nothing_written(run, part, tmp_path, arguments):
         'based_on = "demonstration"\n[program]\ncomment_every = 99999999999999999999\n'
     )
     before = sorted(file.name for file in tmp_path.rglob("*"))
-    done = run(*arguments)
-    assert done.code == 2
+    done = run(*arguments, code=2)
     assert len(done.err.splitlines()) == 1, done.err
     assert "internal" not in done.err
     assert sorted(file.name for file in tmp_path.rglob("*")) == before
@@ -384,8 +355,7 @@ def test_names_with_spaces_and_umlauts(run, part, tmp_path):
     folder = tmp_path / "fö lder"
     folder.mkdir()
     part.rename(folder / "mein Teil ä.nc")
-    done = run(folder / "mein Teil ä.nc", "--json")
-    assert done.code == 0
+    done = run(folder / "mein Teil ä.nc", "--json", code=0)
     assert [Path(file).name for file in json.loads(done.out)["files"]] == [
         "MEIN_TEIL.src",
         "MEIN_TEIL.dat",

@@ -4,7 +4,6 @@ import io
 import os
 import re
 import subprocess
-import sys
 import time
 from itertools import pairwise
 
@@ -14,6 +13,7 @@ from rich.console import Console as Terminal
 from gcode2krl.cli.console import Console
 from gcode2krl.cli.terminal_bars import bars
 from gcode2krl.progress import LEAST_S, Paced, unheard, unseen
+from tests.cli import on_a_terminal
 from tests.conftest import ROOT
 
 PART = ROOT / "examples" / "test_piece.nc"
@@ -86,29 +86,9 @@ def test_nothing_is_shown_in_a_pipe_or_where_it_shall_be_quiet(quiet, capsys, mo
     ],
 )
 def test_each_stage_has_its_bar_on_a_terminal(words, seen, tmp_path):
-    ours, theirs = os.openpty()
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
-    done = subprocess.Popen(
-        [sys.executable, "-m", "gcode2krl", *words],
-        stdout=subprocess.PIPE,
-        stderr=theirs,
-        cwd=tmp_path,
-        env=environment,
-    )
-    os.close(theirs)
-    shown = b""
-    while True:
-        try:
-            piece = os.read(ours, 65536)
-        except OSError:  # the other end is closed
-            break
-        if not piece:
-            break
-        shown += piece
-    result = done.communicate()[0].decode("utf-8")
-    os.close(ours)
-    assert done.returncode == 0
-    text = shown.decode("utf-8")
+    code, text, out = on_a_terminal(tmp_path, *words, stdout=subprocess.PIPE)
+    result = out.decode("utf-8")
+    assert code == 0
     missing = [name for name in seen if name not in text]
     assert not missing
     assert seen or not re.search("|".join(STAGES), text)

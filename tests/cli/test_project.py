@@ -88,8 +88,7 @@ def test_one_batch_translates_two_dialects_in_two_cells_and_a_broken_cell_fails_
         folder,
         'cell = "cell.toml"\n[[files]]\nmatch = "shop/*"\ndialect = "sinumerik"\ncell = "other.toml"\n',
     )
-    done = run("batch", "mill", "shop", "-o", "out")
-    assert done.code == 0
+    done = run("batch", "mill", "shop", "-o", "out", code=0)
     assert "demonstration cell" not in done.out + done.err
     files = {part: Path(told["cell"]["file"]).name for part, told in records("out").items()}
     assert files == {"mill/a.nc": "cell.toml", "shop/b.mpf": "other.toml"}
@@ -121,8 +120,7 @@ def test_what_is_wrong_in_it_is_one_line(folder, run, text, words):
         ("predict", "mill/a.nc", "-o", "p"),
         ("batch", "mill", "-o", "out"),
     ):
-        outcome = run(*command)
-        assert outcome.code == 2
+        outcome = run(*command, code=2)
         assert words in outcome.err
         assert len(outcome.err.strip().splitlines()) <= 2  # the second names `explain`
     assert not (folder / "A.src").exists()

@@ -5,7 +5,6 @@ import shutil
 
 import pytest
 
-from gcode2krl import load_cell, predict
 from tests.conftest import ROOT
 
 PIECE = ROOT / "examples" / "test_piece.nc"
@@ -13,11 +12,6 @@ OUT_OF_REACH = (
     "G21 G90 G54\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z20\nG1 Z-2 F800\nX50\nY5000\nG0 Z50\nM5\nM30\n"
 )
 NOT_GCODE = "G21 G90\nG1 X Z-2 F800\nM30\n"
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(PIECE, load_cell())
 
 
 @pytest.fixture
@@ -29,18 +23,14 @@ def folder(tmp_path, prediction, monkeypatch):
 
 
 def test_the_page_of_a_prediction(run, folder):
-    done = run("report", "prediction", "-o", "report.html")
-    assert done.code == 0
-    assert "prediction -> report.html (0." in done.out
+    assert "prediction -> report.html (0." in run("report", "prediction", "-o", "report.html", code=0).out
     text = (folder / "report.html").read_text(encoding="utf-8")
     assert "test_piece.nc" in text
     assert '"has_text": true' in text  # the G-code still lies where it was predicted from
 
 
 def test_without_an_output_it_lies_beside_the_prediction(run, folder):
-    done = run("report", "prediction/", "--json")
-    assert done.code == 0
-    assert json.loads(done.out)["files"] == ["prediction.html"]
+    assert json.loads(run("report", "prediction/", "--json", code=0).out)["files"] == ["prediction.html"]
     assert (folder / "prediction.html").is_file()
 
 
@@ -50,9 +40,7 @@ def test_changed_gcode_is_not_shown_unless_it_is_named(run, folder, prediction):
     (folder / "part.nc").write_text("G0 X1\n", encoding="ascii")
     moved = replace(prediction, toolpath=replace(prediction.toolpath, source="part.nc"))
     replace(moved, inputs=prediction.inputs | {"program": "part.nc"}).save("moved")
-    done = run("report", "moved", "-o", "moved.html")
-    assert done.code == 0
-    assert "part.nc is not at hand" in done.err
+    assert "part.nc is not at hand" in run("report", "moved", "-o", "moved.html", code=0).err
     assert "is not at hand" in (folder / "moved.html").read_text(encoding="utf-8")
     run("report", "moved", "-o", "moved.html", "--gcode", "part.nc")
     assert '"has_text": true' in (folder / "moved.html").read_text(encoding="utf-8")
@@ -71,23 +59,18 @@ def test_changed_gcode_is_not_shown_unless_it_is_named(run, folder, prediction):
 )
 def test_what_cannot_be_written_is_refused_first(run, folder, words, sentence):
     before = {file.name for file in folder.iterdir()}
-    done = run(*words)
-    assert done.code == 2
-    assert sentence in done.err
+    assert sentence in run(*words, code=2).err
     assert {file.name for file in folder.iterdir()} == before
 
 
 def test_a_report_never_replaces_an_input(run, folder):
     (folder / "part.html").write_text(PIECE.read_text(encoding="ascii"), encoding="ascii")
-    done = run("part.html", "-o", "part.src", "--report", "part.html")
-    assert done.code == 2
-    assert "input" in done.err
+    assert "input" in run("part.html", "-o", "part.src", "--report", "part.html", code=2).err
     assert (folder / "part.html").read_text(encoding="ascii").startswith("%")
 
 
 def test_a_written_program_has_its_page(run, folder):
-    done = run("part.nc", "-o", "part.src", "--report", "part.html", "-q")
-    assert done.code == 0
+    run("part.nc", "-o", "part.src", "--report", "part.html", "-q", code=0)
     text = (folder / "part.html").read_text(encoding="utf-8")
     assert 'class="badge written">written' in text
     assert (folder / "part.src").is_file()
@@ -95,9 +78,7 @@ def test_a_written_program_has_its_page(run, folder):
 
 def test_a_refused_program_has_its_page_with_line_remedy_and_path(run, folder):
     (folder / "far.nc").write_text(OUT_OF_REACH, encoding="ascii")
-    done = run("far.nc", "-o", "far.src", "--report", "far.html")
-    assert done.code == 1
-    assert "far.html written" in done.err
+    assert "far.html written" in run("far.nc", "-o", "far.src", "--report", "far.html", code=1).err
     assert not (folder / "far.src").exists()
     text = (folder / "far.html").read_text(encoding="utf-8")
     assert 'class="badge refused">refused' in text
@@ -109,8 +90,7 @@ def test_a_refused_program_has_its_page_with_line_remedy_and_path(run, folder):
 
 def test_a_program_that_is_not_understood_has_its_page(run, folder):
     (folder / "wrong.nc").write_text(NOT_GCODE, encoding="ascii")
-    done = run("wrong.nc", "-o", "wrong.src", "--report", "wrong.html", "--json")
-    assert done.code == 2
+    done = run("wrong.nc", "-o", "wrong.src", "--report", "wrong.html", "--json", code=2)
     assert json.loads(done.out)["issues"][0]["code"] == "no-number"
     text = (folder / "wrong.html").read_text(encoding="utf-8")
     assert "not understood" in text
@@ -120,6 +100,5 @@ def test_a_program_that_is_not_understood_has_its_page(run, folder):
 
 def test_a_cell_that_is_wrong_is_told_too(run, folder):
     (folder / "cell.toml").write_text("[robot]\nmodle = 3\n", encoding="ascii")
-    done = run("part.nc", "-o", "part.src", "--report", "part.html", "--cell", "cell.toml")
-    assert done.code == 2
+    run("part.nc", "-o", "part.src", "--report", "part.html", "--cell", "cell.toml", code=2)
     assert "modle" in (folder / "part.html").read_text(encoding="utf-8")

@@ -18,8 +18,7 @@ def part(tmp_path):
 
 
 def test_name_header_and_summary_say_that_it_is_a_restart(run, part, tmp_path):
-    done = run(part, "--from-line", 9)
-    assert done.code == 0, done.err
+    done = run(part, "--from-line", 9, code=0)
     assert "restart    from line 9" in done.out
     assert "T1, M3 S12000" in done.out
     text = (tmp_path / "slot_from9.src").read_text("ascii")
@@ -45,8 +44,7 @@ def test_it_verifies_with_its_line(run, part):
 @pytest.mark.parametrize("options", [(), ("--from-line", 8)])
 def test_verify_names_the_line_that_it_needs(run, part, options):
     assert run(part, "--from-line", 9).code == 0
-    done = run("verify", "slot_from9.src", part, *options)
-    assert done.code == 2
+    done = run("verify", "slot_from9.src", part, *options, code=2)
     assert "it begins at G-code line 9" in done.err
     assert "-> --from-line 9" in done.err
 
@@ -57,9 +55,7 @@ def test_verify_sees_another_path_behind_the_start(run, part, tmp_path):
     text = program.read_bytes().decode("ascii")
     assert "LIN {X 180.000" in text
     program.write_bytes(text.replace("LIN {X 180.000", "LIN {X 181.000").encode("ascii"))
-    done = run("verify", "slot_from9.src", part, "--from-line", 9)
-    assert done.code == 1
-    assert "[verify-position]" in done.err
+    assert "[verify-position]" in run("verify", "slot_from9.src", part, "--from-line", 9, code=1).err
 
 
 def test_a_whole_program_is_no_restart(run, part):
@@ -83,24 +79,19 @@ def test_a_given_name_stands(run, part, tmp_path):
     ("line", "words"), [(3, "moves nothing"), (11, "behind the last"), (4, "change to T1")]
 )
 def test_a_bad_line_is_one_clear_line(run, part, tmp_path, line, words):
-    done = run(part, "--from-line", line)
-    assert done.code == 2
-    (said,) = done.err.strip().splitlines()
+    (said,) = run(part, "--from-line", line, code=2).err.strip().splitlines()
     assert words in said
     assert "[restart-line] -> --from-line" in said
     assert not list(tmp_path.glob("*.src"))
 
 
 def test_no_forces_is_refused(run, part):
-    done = run(part, "--from-line", 9, "--no-forces")
-    assert done.code == 2
-    assert "--no-forces" in done.err
+    assert "--no-forces" in run(part, "--from-line", 9, "--no-forces", code=2).err
 
 
 def test_offline_compensation_begins_with_the_material_that_is_left(run, part):
     part.write_text(SLOT.replace("Z-5", "Z-1"), encoding="ascii")
     cell = part.with_name("measured.toml")
     cell.write_text('based_on = "demonstration"\n[material]\nrelative_band = 0.1\n', encoding="utf-8")
-    done = run(part, "--cell", cell, "--from-line", 9, "--compensate", "offline", "--json")
-    assert done.code == 0, done.err
+    done = run(part, "--cell", cell, "--from-line", 9, "--compensate", "offline", "--json", code=0)
     assert "slot_from9.src" in json.loads(done.out)["files"][0]

@@ -14,8 +14,7 @@ def program(run, tmp_path):
 
 
 def test_the_folder_is_beside_the_program_and_named_after_it(run, program, tmp_path):
-    done = run("runkit", program)
-    assert done.code == 0, done.err
+    done = run("runkit", program, code=0)
     kit = tmp_path / "PART_runkit"
     assert sorted(file.name for file in kit.iterdir()) == [
         "PART_AIR.dat",
@@ -53,17 +52,13 @@ def test_a_restart_says_so_on_its_page(run, tmp_path):
     ],
 )
 def test_bad_input_is_one_line(run, program, words, said):
-    done = run("runkit", *words)
-    assert done.code == 2
-    (line,) = done.err.strip().splitlines()
+    (line,) = run("runkit", *words, code=2).err.strip().splitlines()
     assert said in line
 
 
 def test_an_output_that_is_a_file_is_refused(run, program, tmp_path):
     (tmp_path / "kit").write_text("", encoding="ascii")
-    done = run("runkit", program, "-o", "kit")
-    assert done.code == 2
-    assert "this is a file" in done.err
+    assert "this is a file" in run("runkit", program, "-o", "kit", code=2).err
 
 
 def test_a_folder_with_foreign_files_keeps_them(run, program, tmp_path):

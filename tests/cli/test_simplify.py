@@ -49,13 +49,10 @@ def test_a_raster_of_short_moves_takes_less_than_half_the_time(run):
 
 def test_it_is_verified_with_its_tolerance_only(run):
     assert run(RASTER, "-o", "out.src", "--no-forces", "--simplify", "0.01").code == 0
-    done = run("verify", "out.src", RASTER, "--simplify", "0.01")
-    assert done.code == 0, done.err
+    done = run("verify", "out.src", RASTER, "--simplify", "0.01", code=0)
     assert "corners left out, at most 0.0100 mm off (0.0110 allowed)" in done.out
     for options in ((), ("--simplify", "0.02")):
-        other = run("verify", "out.src", RASTER, *options)
-        assert other.code == 2
-        assert "-> --simplify 0.01" in other.err
+        assert "-> --simplify 0.01" in run("verify", "out.src", RASTER, *options, code=2).err
 
 
 def test_verify_sees_a_corner_that_was_taken_out_by_hand(run, part, tmp_path):
@@ -80,8 +77,9 @@ def test_the_header_says_it(run, part, tmp_path):
 @pytest.mark.parametrize("value", ["0", "-1", "2", "nan"])
 @pytest.mark.parametrize("command", ["translate", "predict"])
 def test_a_tolerance_out_of_range_is_one_line(run, part, command, value):
-    done = run(command, part, "-o", "out.src" if command == "translate" else "out", "--simplify", value)
-    assert done.code == 2
+    done = run(
+        command, part, "-o", "out.src" if command == "translate" else "out", "--simplify", value, code=2
+    )
     assert "allowed 0.001 to 1" in done.err
 
 
@@ -91,8 +89,7 @@ def test_with_compensation(run, part):
     original = result["verify"]["original"]
     assert original["left_out"] > 200
     assert original["limit_mm"] > 0.05  # the correction
-    done = run("verify", "out.src", part, *options)
-    assert done.code == 0, done.err
+    run("verify", "out.src", part, *options, code=0)
 
 
 def test_with_a_restart(run, part):
@@ -113,8 +110,7 @@ def test_with_rsi_and_a_page(run, part, tmp_path):
 
 
 def test_standard_output_carries_it(run, part):
-    done = run(part, "-o", "-", "--name", "PART", "--simplify", "0.01")
-    assert done.code == 0, done.err
+    done = run(part, "-o", "-", "--name", "PART", "--simplify", "0.01", code=0)
     assert "simplified: within 0.01 mm" in done.out
 
 
@@ -132,6 +128,5 @@ def test_a_saved_prediction_remembers_it(run, part, tmp_path):
 
 def test_a_page_of_a_refused_program_is_simplified_too(run, part, tmp_path):
     part.write_text(PART.replace("M5\n", "G0 Z-5\nX0\nM5\n"))
-    done = run(part, "--cell", "cell.toml", "-o", "out.src", "--simplify", "0.01", "--report", "out.html")
-    assert done.code == 1
+    run(part, "--cell", "cell.toml", "-o", "out.src", "--simplify", "0.01", "--report", "out.html", code=1)
     assert (tmp_path / "out.html").exists()

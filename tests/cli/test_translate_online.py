@@ -30,8 +30,7 @@ def test_program_and_files_are_written_listed_and_verified(translate, run, tmp_p
     assert made(tmp_path) == sorted(FILES)
     assert sorted(file for file in result["files"]) == sorted(FILES)
     assert not any(issue["code"].startswith(("online", "rsi")) for issue in result["issues"])
-    again = run("verify", "out.src", "part.nc", "--cell", "cell.toml", "--json")
-    assert again.code == 0, again.err
+    again = run("verify", "out.src", "part.nc", "--cell", "cell.toml", "--json", code=0)
     assert json.loads(again.out)["verify"]["ok"]
 
 
@@ -60,15 +59,11 @@ def test_verify_notices_a_changed_cell_and_a_changed_program(translate, run, tmp
     verify = ("verify", "out.src", "part.nc", "--cell", "cell.toml", "-q")
     text = (tmp_path / "out.src").read_bytes()
     (tmp_path / "out.src").write_bytes(text.replace(b"#ABSOLUTE", b"#RELATIVE"))
-    done = run(*verify)
-    assert done.code == 1
-    assert "[rsi-mode]" in done.err
+    assert "[rsi-mode]" in run(*verify, code=1).err
     (tmp_path / "out.src").write_bytes(text)
     assert run(*verify).code == 0
     (tmp_path / "cell.toml").write_text(CELL.replace("1.5", "1.0"), encoding="utf-8")
-    done = run(*verify)
-    assert done.code == 1
-    assert "[rsi-file]" in done.err
+    assert "[rsi-file]" in run(*verify, code=1).err
 
 
 @pytest.mark.parametrize(
@@ -95,8 +90,7 @@ def test_wrong_options_are_one_line_and_nothing_is_written(translate, tmp_path, 
 
 def test_not_on_standard_output(run, tmp_path):
     (tmp_path / "part.nc").write_text(CLEAN, encoding="ascii")
-    done = run("part.nc", "-o", "-", "--online", "A")
-    assert done.code == 2
+    done = run("part.nc", "-o", "-", "--online", "A", code=2)
     assert "standard output" in done.err
     assert done.out == ""
 
@@ -116,8 +110,7 @@ def test_both_compensations_need_a_word(translate, run, tmp_path):
 def test_a_part_with_two_tools_is_refused_with_its_line(run, tmp_path):
     text = CLEAN.replace("M5\n", "T2 M6\nG0 G43 H2 Z50\nG0 X0 Y0\nG1 Z-2 F600\nG0 Z50\nM5\n")
     (tmp_path / "part.nc").write_text(text, encoding="ascii")
-    done = run("part.nc", "--online", "A", "--json")
-    assert done.code == 1
+    done = run("part.nc", "--online", "A", "--json", code=1)
     errors = [issue for issue in json.loads(done.out)["issues"] if issue["severity"] == "error"]
     assert ("online-tool", 9) in [(issue["code"], issue["line"]) for issue in errors]
     assert made(tmp_path) == []

@@ -36,8 +36,7 @@ def slot(run, tmp_path):
     part, cell, src = tmp_path / "slot.nc", tmp_path / "cell.toml", tmp_path / "slot.src"
     part.write_text(SLOT)
     cell.write_text(CELL)
-    made = run(part, "--cell", cell, "-o", src, "--allow", "rapid-in-stock")
-    assert made.code == 0, made.err
+    run(part, "--cell", cell, "-o", src, "--allow", "rapid-in-stock", code=0)
     return part, cell, src
 
 
@@ -138,10 +137,8 @@ def test_an_example_with_its_own_cell_agrees(run, tmp_path, name):
     nc, src = tmp_path / "part.nc", tmp_path / "made.src"
     shutil.copy(EXAMPLES / part, nc)
     named = [] if cell is None else ["--cell", EXAMPLES / cell]
-    made = run(nc, "-o", src, *named, *options)
-    assert made.code == 0, made.err
-    checked = run("verify", src, nc, *named, *stated)
-    assert checked.code == 0, checked.err
+    run(nc, "-o", src, *named, *options, code=0)
+    checked = run("verify", src, nc, *named, *stated, code=0)
     assert "agrees with" in checked.out
     assert "cell hash" not in checked.err
 
@@ -151,10 +148,8 @@ def test_a_compensated_program_agrees(run, tmp_path):
     nc.write_text(SLOT.replace("G0 X60\n", "").replace("Z-2", "Z-0.5"))
     cell.write_text(CELL + "[material]\nrelative_band = 0.1\n")
     options = ("--cell", cell, "--compensate", "offline")
-    made = run(nc, "-o", tmp_path / "made.src", *options)
-    assert made.code == 0, made.err
-    checked = run("verify", tmp_path / "made.src", nc, *options)
-    assert checked.code == 0, checked.err
+    run(nc, "-o", tmp_path / "made.src", *options, code=0)
+    run("verify", tmp_path / "made.src", nc, *options, code=0)
 
 
 G43, LONGER = "G0 G43 H1 Z20", "[tool.1]\ndiameter_mm = 10.0\nteeth = 2\nlength_mm = 104.0\n"

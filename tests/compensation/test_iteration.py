@@ -1,6 +1,5 @@
 """Offline compensation on stand-in forces: exact where the answer is known, refused where it is uncertain."""
 
-import io
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,31 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import compliance, robot, write_krl
+from gcode2krl import compliance, write_krl
 from gcode2krl.compensation.intended_path import MOST_SLOPE
 from gcode2krl.compensation.iteration import compensate, refuse_twice
 from gcode2krl.errors import NotUnderstoodError, RefusedError
-from gcode2krl.gcode import read_stream
 from gcode2krl.krl.read import read_krl
 from gcode2krl.krl.verify import compare
-from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
-from gcode2krl.tables import Forces
+from gcode2krl.pipeline import plan_motion, solve_joints
+from tests.compensation import below, corrected, read, stages
 
-HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS8000 M3\nG0 G43 H1 Z20\nG0 X0 Y0\nG0 Z2\n"
 LINE = "G1 Z-2 F600\nG1 X100 F1500\n"
 RECTANGLE = LINE + "G1 Y60\nG1 X0\nG1 Y0\n"
 CIRCLE = "G1 Z-2 F600\nG3 X0 Y0 I30 J0 F1500\n"
-TAIL = "G0 Z20\nM5\nM30\n"
 CONSTANT = np.array([300.0, 400.0, -100.0])
-
-
-def read(body, cell):
-    toolpath = read_stream(io.BytesIO((HEAD + body + TAIL).encode()), "part.nc", cell)
-    return toolpath, set_targets(toolpath, cell)
-
-
-def below(motion):
-    return (motion.position_mm[:, 2] < 0.0)[:, None]
 
 
 def constant(motion):
@@ -60,37 +47,10 @@ def jump(motion):
     return np.where(below(motion) & (motion.position_mm[:, :1] > 40.0), [0.0, 600.0, 0.0], 0.0)
 
 
-def corrected(toolpath, targets, cell, law, band=0.3, **options):
-    """The compensation of targets whose forces are a function of the intended position."""
-    motion, forces, _ = stages(targets, cell, law, band)
-    return compensate(toolpath, targets, cell, motion, forces, **options)
-
-
-def stages(targets, cell, law, band=0.3):
-    """The stages behind the targets, with forces that are a function of the commanded position."""
-    motion = plan_motion(targets, cell)
-    joints = robot.follow_motion(motion, cell)
-    rows = len(motion)
-    nothing = np.zeros(rows)
-    forces = Forces(
-        force_base_N=law(motion),
-        moment_base_Nmm=np.zeros((rows, 3)),
-        peak_N=nothing,
-        torque_Nmm=nothing,
-        a_p_mm=nothing,
-        a_e_mm=nothing,
-        phi_rad=np.zeros((rows, 2)),
-        tool=motion.tool,
-        relative_band=band,
-    )
-    return motion, forces, compliance.deflect(joints, forces, cell)
-
-
 @pytest.mark.parametrize("law", [constant, everywhere, linear, quadratic, jump])
 @pytest.mark.parametrize("body", [LINE, RECTANGLE, CIRCLE])
 def test_bent_tool_runs_on_the_intended_path(cell, body, law):
-    toolpath, targets = read(body, cell)
-    done = corrected(toolpath, targets, cell, law)
+    done = corrected(body, cell, law)
     assert done.before.max_mm > 0.4
     assert done.after.steady_max_mm < 0.005
     assert np.count_nonzero(done.after.steady) > 0.5 * np.count_nonzero(done.after.cuts)
@@ -100,8 +60,7 @@ def test_bent_tool_runs_on_the_intended_path(cell, body, law):
 
 def test_shift_is_minus_the_deflection_normal_to_the_feed(cell):
     """At the end of a line under a constant force, against eq. 10 computed here at the moved pose."""
-    toolpath, targets = read(LINE, cell)
-    done = corrected(toolpath, targets, cell, everywhere)
+    done = corrected(LINE, cell, everywhere)
     row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
     q = solve_joints(done.targets, cell).q_rad[row]
     base = cell.base_matrix()[:3, :3]
@@ -111,8 +70,7 @@ def test_shift_is_minus_the_deflection_normal_to_the_feed(cell):
 
 
 def test_result_stays_when_it_is_evaluated_again(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, linear)
+    done = corrected(RECTANGLE, cell, linear)
     motion, _, deflection = stages(done.targets, cell, linear)
     side = np.flatnonzero(
         (motion.position_mm[:, 0] > 20.0) & (motion.position_mm[:, 0] < 80.0) & below(motion)[:, 0]
@@ -124,8 +82,7 @@ def test_result_stays_when_it_is_evaluated_again(cell):
 
 
 def test_sharp_corner_keeps_both_lines(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, everywhere)
+    done = corrected(RECTANGLE, cell, everywhere)
     bent = done.evaluated[0].position_mm + done.evaluated[3].deflection_base_mm
     near = np.linalg.norm(bent[:, :2] - [100.0, 60.0], axis=1) < 5.0
     near &= bent[:, 2] < 0.0
@@ -134,8 +91,8 @@ def test_sharp_corner_keeps_both_lines(cell):
 
 
 def test_air_and_rapids_are_not_touched(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, constant)
+    toolpath, _ = read(RECTANGLE, cell)
+    done = corrected(RECTANGLE, cell, constant)
     shift = np.linalg.norm(done.targets.position_mm - done.intended.position_mm, axis=1)
     rapid = done.targets.ptp | (done.targets.move < 0) | toolpath.rapid[np.maximum(done.targets.move, 0)]
     assert shift[rapid].max() == 0.0
@@ -146,17 +103,17 @@ def test_air_and_rapids_are_not_touched(cell):
 
 
 def test_nothing_to_correct_changes_nothing(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, lambda motion: 0.0 * motion.position_mm)
+    _, targets = read(RECTANGLE, cell)
+    done = corrected(RECTANGLE, cell, lambda motion: 0.0 * motion.position_mm)
     assert np.array_equal(done.targets.position_mm, targets.position_mm)
     assert done.figures["rows_added"] == 0
 
 
 def test_lines_are_divided_within_tolerance_and_keep_speed(cell):
-    toolpath, targets = read(LINE, cell)
+    _, targets = read(LINE, cell)
     counts = {}
     for tolerance_mm in (0.05, 0.01, 0.002):
-        done = corrected(toolpath, targets, cell, quadratic, tolerance_mm=tolerance_mm)
+        done = corrected(LINE, cell, quadratic, tolerance_mm=tolerance_mm)
         counts[tolerance_mm] = done.figures["rows_added"]
         assert done.after.steady_max_mm <= tolerance_mm
     assert 0 < counts[0.05] < counts[0.01] < counts[0.002]
@@ -169,16 +126,15 @@ def test_lines_are_divided_within_tolerance_and_keep_speed(cell):
 
 
 def test_straight_correction_divides_nothing(cell):
-    toolpath, targets = read(LINE, cell)
-    done = corrected(toolpath, targets, cell, everywhere)
+    done = corrected(LINE, cell, everywhere)
     row = int(np.flatnonzero(np.abs(done.intended.position_mm[:, 0] - 100.0) < 1e-9)[0])
     on_line = done.intended.move == done.intended.move[row]
     assert np.count_nonzero(on_line) <= 3  # the end of the ramp after contact
 
 
 def test_pieces_carry_their_line(cell):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, quadratic)
+    _, targets = read(RECTANGLE, cell)
+    done = corrected(RECTANGLE, cell, quadratic)
     moved, intended = done.targets, done.intended
     new = np.flatnonzero((moved.move[:-1] == moved.move[1:]) & (moved.move[:-1] >= 0) & ~moved.ptp[1:])
     assert len(new) == done.figures["rows_added"] > 10
@@ -198,8 +154,8 @@ def test_pieces_carry_their_line(cell):
 
 def test_events_stay_where_they_were(cell):
     body = "G1 Z-2 F600\nG1 X60 F1500\nM8\nG1 X100\nM9\nG1 Y40\n"
-    toolpath, targets = read(body, cell)
-    done = corrected(toolpath, targets, cell, quadratic)
+    _, targets = read(body, cell)
+    done = corrected(body, cell, quadratic)
     assert done.figures["rows_added"] > 0
     assert len(done.targets.events) == len(targets.events)
     for before, after in zip(targets.events, done.targets.events, strict=True):
@@ -209,8 +165,7 @@ def test_events_stay_where_they_were(cell):
 
 
 def test_jump_of_the_force_is_ramped(cell):
-    toolpath, targets = read(LINE, cell)
-    done = corrected(toolpath, targets, cell, jump)
+    done = corrected(LINE, cell, jump)
     shift = done.targets.position_mm - done.intended.position_mm
     on_line = np.flatnonzero(done.intended.position_mm[:, 2] == -2.0)
     step = np.linalg.norm(np.diff(shift[on_line], axis=0), axis=1)
@@ -222,14 +177,13 @@ def test_jump_of_the_force_is_ramped(cell):
 
 
 def test_force_that_rises_over_the_cutters_radius_is_followed(cell):
-    toolpath, targets = read("G0 X-20\nG1 Z-2 F600\nG1 X100 F1500\nG1 Y60\nG1 X-20\n", cell)
 
     def entering(motion):
         x = motion.position_mm[:, :1]
         engaged = np.clip((x + 8.0) / 16.0, 0.0, 1.0)
         return np.where(below(motion) & (x > -8.0), engaged * np.array([150.0, 450.0, -50.0]), 0.0)
 
-    done = corrected(toolpath, targets, cell, entering)
+    done = corrected("G0 X-20\nG1 Z-2 F600\nG1 X100 F1500\nG1 Y60\nG1 X-20\n", cell, entering)
     assert done.before.max_mm > 1.0
     assert done.after.max_mm < 0.02
     assert done.after.rms_mm < 0.002
@@ -237,9 +191,8 @@ def test_force_that_rises_over_the_cutters_radius_is_followed(cell):
 
 @pytest.mark.parametrize("tolerance_mm", [0.0, -1.0, np.nan, np.inf])
 def test_tolerance_must_be_positive(cell, tolerance_mm):
-    toolpath, targets = read(LINE, cell)
     with pytest.raises(NotUnderstoodError, match="tolerance"):
-        corrected(toolpath, targets, cell, constant, tolerance_mm=tolerance_mm)
+        corrected(LINE, cell, constant, tolerance_mm=tolerance_mm)
 
 
 def test_forces_stay_at_their_places(cell):
@@ -256,19 +209,17 @@ def test_forces_stay_at_their_places(cell):
 @pytest.mark.parametrize("later_mm", np.arange(0.0, 0.3, 0.05))
 def test_a_step_of_the_force_at_a_corner_settles_at_once(cell, later_mm):
     """Wherever the samples of the moved path happen to be, two of which lie 0.3 mm apart."""
-    toolpath, targets = read(RECTANGLE, cell)
 
     def leaving(motion):
         at = motion.position_mm
         return np.where(below(motion) & ((at[:, :1] < 99.9) | (at[:, 1:2] < later_mm)), CONSTANT, -CONSTANT)
 
-    assert corrected(toolpath, targets, cell, leaving).figures["rounds"] <= 2
+    assert corrected(RECTANGLE, cell, leaving).figures["rounds"] <= 2
 
 
 def test_a_correction_larger_than_any_robot_bends_is_refused(cell):
-    toolpath, targets = read(LINE, cell)
     with pytest.raises(RefusedError, match="compensation-large"):
-        corrected(toolpath, targets, cell, lambda motion: 20.0 * constant(motion))
+        corrected(LINE, cell, lambda motion: 20.0 * constant(motion))
 
 
 def test_a_line_that_would_run_backwards_is_refused(cell):
@@ -277,19 +228,17 @@ def test_a_line_that_would_run_backwards_is_refused(cell):
     half = [(a + b) / 2.0 for a, b in pairwise(corner)]
     points = [point for pair in zip(half, corner[1:], strict=True) for point in pair]
     body = "G1 Z-2 F600\n" + "".join(f"G1 X{x:.4f} Y{y:.4f} F1200\n" for x, y in points)
-    toolpath, targets = read(body, cell)
     with pytest.raises(RefusedError, match="run backwards") as caught:
-        corrected(toolpath, targets, cell, lambda motion: 2.5 * constant(motion))
+        corrected(body, cell, lambda motion: 2.5 * constant(motion))
     assert caught.value.issues[0].code == "compensation-large"
 
 
 def test_unsure_deflection_is_refused_wherever_its_numbers_come_from(cell):
-    toolpath, targets = read(LINE, cell)
     measured = cell.material.model_copy(update={"sure": "checked", "source": "identified from slots.csv"})
     sure = cell.compliance.model_copy(update={"sure": "checked", "robot_sure": "verified"})
     known = cell.model_copy(update={"material": measured, "compliance": sure})
     with pytest.raises(RefusedError, match="compensation-unsure") as caught:
-        corrected(toolpath, targets, known, constant, band=0.6)
+        corrected(LINE, known, constant, band=0.6)
     assert "identify force" in caught.value.issues[0].remedy
 
 
@@ -301,15 +250,14 @@ def test_not_together_with_online():
 
 
 def test_findings_of_the_moved_targets_are_added_once(cell):
-    toolpath, targets = read(LINE, cell)
-    done = corrected(toolpath, targets, cell, everywhere)
+    _, targets = read(LINE, cell)
+    done = corrected(LINE, cell, everywhere)
     assert done.targets.issues[: len(targets.issues)] == targets.issues
     assert len(set(done.targets.issues)) == len(done.targets.issues)
 
 
 def test_compensated_program_verifies(cell, tmp_path):
-    toolpath, targets = read(RECTANGLE, cell)
-    done = corrected(toolpath, targets, cell, linear)
+    done = corrected(RECTANGLE, cell, linear)
     written = write_krl(done.targets, tmp_path / "part.src", cell)
     assert written.report.ok
     assert written.report.max_deviation_mm < 0.002
@@ -323,8 +271,7 @@ def test_compensated_program_verifies(cell, tmp_path):
 def test_no_lines_are_divided_where_every_target_is_a_stop(cell):
     controller = cell.controller.model_copy(update={"advance": 0})
     stopping = cell.model_copy(update={"controller": controller})
-    toolpath, targets = read(LINE, stopping)
-    done = corrected(toolpath, targets, stopping, quadratic)
+    done = corrected(LINE, stopping, quadratic)
     assert done.figures["rows_added"] == 0
     assert done.figures["after_rms_mm"] < done.figures["before_rms_mm"]
 
@@ -336,9 +283,8 @@ def test_any_constant_force_in_any_direction(force, angle):
 
     cell = load_cell()
     x, y = 80.0 * np.cos(angle), 80.0 * np.sin(angle)
-    toolpath, targets = read(f"G1 Z-2 F600\nG1 X{x:.3f} Y{y:.3f} F1500\n", cell)
     law = lambda motion: np.tile(np.array(force), (len(motion), 1))  # noqa: E731
-    done = corrected(toolpath, targets, cell, law)
+    done = corrected(f"G1 Z-2 F600\nG1 X{x:.3f} Y{y:.3f} F1500\n", cell, law)
     assert done.after.steady_max_mm < 0.005
     end = int(np.flatnonzero(np.hypot(*(done.intended.position_mm[:, :2] - [x, y]).T) < 1e-3)[0])
     shift = done.targets.position_mm[end] - done.intended.position_mm[end]

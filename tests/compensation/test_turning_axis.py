@@ -1,6 +1,5 @@
 """Offline compensation while the tool's axis turns: each place against eq. 10, all of it as one body."""
 
-import io
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +11,12 @@ from gcode2krl.cell.sections import Machine, Tool
 from gcode2krl.compensation.intended_path import MOST_SLOPE, Placed, Ways, deviation_from
 from gcode2krl.compensation.iteration import compensate
 from gcode2krl.errors import RefusedError
-from gcode2krl.gcode import read_gcode, read_stream
+from gcode2krl.gcode import read_gcode
 from gcode2krl.pipeline import plan_motion, set_targets, solve_joints
 from tests.cells import over_demonstration
-from tests.compensation.test_iteration import TAIL, stages
+from tests.compensation import below, corrected, read, stages
 from tests.test_external_axes import ON_TABLE, TABLE, TABLE_MACHINE, cone
 
-HEAD = "G21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS8000 M3\nG0 G43 H1 Z60 A0 C0\nG0 X0 Y0\nG0 Z2\n"
 IN_TOOL = np.array([300.0, 450.0, -150.0])
 """A force that stays as it is for somebody who sits on the tool."""
 LEANING = "G1 Z-2 F600\nG1 X100 A16 F1500\n"
@@ -32,15 +30,6 @@ def head(cell):
     return cell.model_copy(update={"machine": machine})
 
 
-def read(body, cell):
-    toolpath = read_stream(io.BytesIO((HEAD + body + TAIL).encode()), "part.nc", cell)
-    return toolpath, set_targets(toolpath, cell)
-
-
-def below(motion):
-    return (motion.position_mm[:, 2] < 0.0)[:, None]
-
-
 def in_tool(motion):
     """The constant force of a tool's frame, along ``$BASE``; in air none."""
     return np.where(below(motion), Rotation.from_quat(motion.rotation).apply(IN_TOOL), 0.0)
@@ -51,16 +40,10 @@ def growing(motion):
     return size * in_tool(motion)
 
 
-def corrected(body, cell, law, **options):
-    toolpath, targets = read(body, cell)
-    motion, forces, _ = stages(targets, cell, law, 0.3)
-    return toolpath, targets, compensate(toolpath, targets, cell, motion, forces, **options)
-
-
 @pytest.mark.parametrize("body", [LEANING, TWISTING])
 def test_each_target_is_moved_by_the_deflection_at_its_own_orientation(head, body):
     """Eq. 10, with the orientation of the moved target, where neither a ramp nor a corner is near."""
-    _, _, done = corrected(body, head, in_tool)
+    done = corrected(body, head, in_tool)
     moved, intended = done.targets, done.intended
     q = solve_joints(moved, head).q_rad
     base = head.base_matrix()[:3, :3]
@@ -85,7 +68,7 @@ def test_each_target_is_moved_by_the_deflection_at_its_own_orientation(head, bod
 
 def test_what_remains_is_found_again_from_the_written_targets(head):
     """The moved targets planned, bent and measured anew, by the distance of the tip to the line of Y0 Z-2."""
-    _, _, done = corrected(LEANING, head, in_tool)
+    done = corrected(LEANING, head, in_tool)
     motion, _, deflection = stages(done.targets, head, in_tool)
     bent = motion.position_mm + deflection.deflection_base_mm
     on_line = below(motion)[:, 0] & (bent[:, 0] > 12.0) & (bent[:, 0] < 98.0)
@@ -111,7 +94,8 @@ def turned_cell(cell, turn):
 @pytest.mark.parametrize(("turn", "all_over"), [(QUARTER, True), (ANY, False)])
 def test_a_part_turned_as_one_body_is_corrected_as_one_body(head, turn, all_over):
     """Ramps are bounded along X, Y and Z, so they are turned by a quarter alone."""
-    toolpath, targets, done = corrected(TWISTING, head, growing)
+    toolpath, targets = read(TWISTING, head)
+    done = corrected(TWISTING, head, growing)
     other_cell = turned_cell(head, turn)
     other = replace(
         targets,
@@ -224,7 +208,7 @@ def test_a_constant_axis_has_no_turn(head, lean):
 
 
 def test_ramps_and_sizes_keep_their_limits(head):
-    _, _, done = corrected(TWISTING, head, in_tool)
+    done = corrected(TWISTING, head, in_tool)
     shift = done.targets.position_mm - done.intended.position_mm
     way = np.linalg.norm(np.diff(done.intended.position_mm, axis=0), axis=1)
     step = np.abs(np.diff(shift, axis=0)).max(axis=1)
@@ -237,7 +221,8 @@ def test_ramps_and_sizes_keep_their_limits(head):
 
 
 def test_divided_lines_turn_as_the_whole_ones_did_and_are_no_slower(head):
-    _, targets, done = corrected(LEANING, head, growing, tolerance_mm=0.002)
+    _, targets = read(LEANING, head)
+    done = corrected(LEANING, head, growing, tolerance_mm=0.002)
     assert done.figures["rows_added"] > 3
     whole, pieces = plan_motion(targets, head), done.evaluated[0]
     at = np.linspace(10.0, 90.0, 50)
@@ -264,7 +249,7 @@ def rounding(lines, turn_deg):
 
 def test_no_piece_of_a_polygon_runs_backwards(head):
     """Corners of 6° move along the curve by most of the deflection, and so do the places between them."""
-    _, _, done = corrected(rounding(24, 60.0), head, lambda motion: 2.2 * in_tool(motion))
+    done = corrected(rounding(24, 60.0), head, lambda motion: 2.2 * in_tool(motion))
     before, after = (np.diff(each.position_mm, axis=0) for each in (done.intended, done.targets))
     cuts = (done.intended.position_mm[1:, 2] == -2.0) & (done.intended.position_mm[:-1, 2] == -2.0)
     share = np.einsum("ij,ij->i", before, after)[cuts] / np.einsum("ij,ij->i", before, before)[cuts]
@@ -283,7 +268,7 @@ def test_a_turn_on_the_spot_is_refused_in_material_alone(head):
         corrected(body, head, in_tool)
     assert (caught.value.issues[0].code, caught.value.issues[0].line) == ("axis-turns", 10)
     in_air = "G1 Z-2 F600\nG1 X40 F1500\nG1 Z5\nG1 A10 F600\nG1 Z-2\nG1 X80 F1500\n"
-    assert corrected(in_air, head, in_tool)[2].figures["max_correction_mm"] > 0.5
+    assert corrected(in_air, head, in_tool).figures["max_correction_mm"] > 0.5
 
 
 @pytest.mark.parametrize("table", [{"follows": "tool"}, {"position": 75.0}])
@@ -301,7 +286,7 @@ def test_a_table_that_turns_the_part_turns_the_force_with_it(tmp_path, table):
 
 
 def test_a_compensated_program_verifies(head, tmp_path):
-    _, _, done = corrected(TWISTING, head, in_tool)
+    done = corrected(TWISTING, head, in_tool)
     written = write_krl(done.targets, tmp_path / "part.src", head)
     assert written.report.ok
     assert written.report.max_deviation_mm < 0.002

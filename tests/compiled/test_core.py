@@ -5,14 +5,19 @@ import importlib.util
 import os
 import subprocess
 import sys
+import threading
 from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gcode2krl.compiled import core
+from gcode2krl.compiled.chunks import chunk_borders, in_chunks
 from gcode2krl.compiled.core import FLOAT, FLOATS, INT, OUT_FLOATS, StructOf
+from gcode2krl.compiled.inputs import contiguous, locked, shaped
 
 ROOT = Path(__file__).parents[2]
 
@@ -119,3 +124,71 @@ def test_every_platform_of_a_wheel_has_a_library_of_its_own_kind(target):
         ["core", "core_wide"] if target in ("x86_64-windows-gnu", "x86_64-linux-gnu") else ["core"]
     )
     assert machine.flags[0] == "-target"
+
+
+@given(st.integers(0, 200), st.integers(1, 50))
+def test_every_row_once_and_in_order(count, rows):
+    spans = in_chunks(lambda start, end: (start, end), chunk_borders(count, rows))
+    assert [row for start, end in spans for row in range(start, end)] == list(range(count))
+    assert all(0 < end - start <= rows for start, end in spans)
+
+
+def test_results_do_not_depend_on_who_is_first():
+    second_may_end = threading.Event()
+
+    def work(start, end):
+        if start == 0:
+            second_may_end.wait(0.05)
+        else:
+            second_may_end.set()
+        return np.arange(start, end)
+
+    assert np.concatenate(in_chunks(work, chunk_borders(30, 10))).tolist() == list(range(30))
+
+
+def test_an_error_in_a_chunk_comes_out():
+    def work(start, end):
+        if start == 20:
+            raise ValueError("row 20")
+
+    with pytest.raises(ValueError, match="row 20"):
+        in_chunks(work, chunk_borders(30, 10))
+
+
+def test_locked_is_a_view_and_leaves_the_array_itself_open():
+    array = np.zeros(3)
+    view = locked(array)
+    with pytest.raises(ValueError, match="read-only"):
+        view[0] = 1.0
+    array[0] = 2.0
+    assert view[0] == 2.0
+
+
+@pytest.mark.parametrize("values", [[1, 2, 3], np.arange(6)[::2], np.zeros(3, dtype=np.float32)])
+def test_contiguous_is_one_type_whatever_comes_in(values):
+    found = contiguous(values)
+    assert found.dtype == np.float64
+    assert found.flags.c_contiguous
+    assert found.tolist() == np.asarray(values).tolist()
+
+
+def test_contiguous_does_not_copy_what_fits():
+    array = np.zeros((4, 3))
+    assert np.shares_memory(contiguous(array), array)
+
+
+def test_shaped_takes_any_length_where_minus_one_stands():
+    assert shaped("force", np.zeros((5, 3)), -1, 3).shape == (5, 3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "wanted", "words"),
+    [
+        ((5, 2), (-1, 3), r"force has shape \(5, 2\), not \(n, 3\)"),
+        ((3,), (-1, 3), r"force has shape \(3,\), not \(n, 3\)"),
+        ((4, 3), (5, 3), r"force has shape \(4, 3\), not \(5, 3\)"),
+    ],
+)
+def test_a_wrong_shape_is_named(shape, wanted, words):
+    with pytest.raises(ValueError, match=words):
+        shaped("force", np.zeros(shape), *wanted)

@@ -7,7 +7,7 @@ over the rim, 7200 points all around.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,6 +31,13 @@ class Scene:
     radius_mm: float = 8.0
     step_mm: float = 0.5
     steady: tuple = field(default=())  # places on the path between which the engagement does not change
+
+    def turned(self, degrees: float, bound_mm: float, step_mm: float = 0.5, name: str = "") -> "Scene":
+        """The scene turned about the origin, within bounds of so much to each side."""
+        low, high = (-bound_mm, -bound_mm), (bound_mm, bound_mm)
+        top, corners = turned(self.top, degrees), turn(self.corners, degrees)
+        name = name or f"{self.name}, turned {degrees:g}°"
+        return replace(self, name=name, top=top, low=low, high=high, corners=corners, step_mm=step_mm)
 
     def field(self, cell_mm: float) -> HeightField:
         """The stock at the middle of cells that fill its bounds; the bounds are faces of a block in it."""
@@ -124,37 +131,13 @@ def transitions() -> list[Scene]:
     low, high = (-22.0, -20.0), (23.0, 20.0)
     off_low, off_high = (-22.0371, -20.0193), (23.0139, 20.0527)
     straight = way((-34, 0, -5), (35, 0, -5))
-    shape = box(low, high)
-    wide_low, wide_high = (-32.0, -32.0), (32.0, 32.0)
+    slot = Scene("slot", box(low, high), low, high, straight, steady=(25, 45))
+    off_grid = {"top": box(off_low, off_high), "low": off_low, "high": off_high, "step_mm": 0.37}
     return [
-        Scene("slot", shape, low, high, straight, steady=(25, 45)),
-        Scene(
-            "slot, off the grid",
-            box(off_low, off_high),
-            off_low,
-            off_high,
-            straight + np.array([0.0173, 0.0311, 0.0]),
-            step_mm=0.37,
-            steady=(25, 45),
-        ),
-        Scene(
-            "slot and stock turned 30°",
-            turned(shape, 30),
-            wide_low,
-            wide_high,
-            turn(straight, 30),
-            step_mm=0.37,
-            steady=(25, 45),
-        ),
-        Scene(
-            "slot and stock turned 77°, short steps",
-            turned(shape, 77),
-            wide_low,
-            wide_high,
-            turn(straight, 77),
-            step_mm=0.05,
-            steady=(25, 45),
-        ),
+        slot,
+        replace(slot, name="slot, off the grid", corners=straight + way((0.0173, 0.0311, 0.0)), **off_grid),
+        slot.turned(30, 32.0, 0.37, "slot and stock turned 30°"),
+        slot.turned(77, 32.0, 0.05, "slot and stock turned 77°, short steps"),
     ]
 
 
@@ -162,64 +145,28 @@ def steady_scenes() -> list[Scene]:
     """Cuts whose engagement is constant over some distance, or changes within a corner."""
     low, high = (-25.0, -20.0), (25.0, 20.0)
     shape = box(low, high)
-    wide_low, wide_high = (-33.0, -33.0), (33.0, 33.0)
     up, down = way((-35, -20, -5), (35, -20, -5)), way((-35, 20, -5), (35, 20, -5))
     thin = way((-35, 27.5, -5), (35, 27.5, -5))
     second = way((-35, 0, -5), (35, 0, -5), (35, 30, -5), (-35, 30, -5), (-35, 0.63, -5), (35, 0.63, -5))
+    corners = ((-12, -6), (6, -6), (6, 12), (-12, 12), (-12, -5), (-11, -10), (10, -10), (10, 12))
+    pocket = way(*((x, y, -5) for x, y in corners))
 
     def step(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.where(y > 2.3, shape(x, y), shape(x, y) - 3.0)
 
-    pocket = way(
-        (-12, -6, -5),
-        (6, -6, -5),
-        (6, 12, -5),
-        (-12, 12, -5),
-        (-12, -5, -5),
-        (-11, -10, -5),
-        (10, -10, -5),
-        (10, 12, -5),
-    )
+    half_down = Scene("half immersion, down", shape, low, high, down, steady=(25, 50))
+    beside_slot = Scene("0.63 mm beside a slot", shape, low, high, second, steady=(225, 250))
+    stepped = Scene("step in the stock", step, low, high, way((-35, 0, -5), (35, 0, -5)), steady=(25, 50))
+    in_corner = Scene("pocket corner", shape, low, high, pocket, step_mm=0.5, steady=(85, 112))
     return [
         Scene("half immersion, up", shape, low, high, up, steady=(25, 50)),
-        Scene("half immersion, down", shape, low, high, down, steady=(25, 50)),
-        Scene(
-            "half immersion, down, turned 30°",
-            turned(shape, 30),
-            wide_low,
-            wide_high,
-            turn(down, 30),
-            step_mm=0.43,
-            steady=(25, 50),
-        ),
+        half_down,
+        half_down.turned(30, 33.0, 0.43),
         Scene("0.5 mm beside a face", shape, low, high, thin, steady=(25, 50)),
-        Scene("0.63 mm beside a slot", shape, low, high, second, steady=(225, 250)),
-        Scene(
-            "0.63 mm beside a slot, turned 30°",
-            turned(shape, 30),
-            wide_low,
-            wide_high,
-            turn(second, 30),
-            step_mm=0.41,
-            steady=(225, 250),
-        ),
-        Scene("step in the stock", step, low, high, way((-35, 0, -5), (35, 0, -5)), steady=(25, 50)),
-        Scene(
-            "step in the stock, turned 30°",
-            turned(step, 30),
-            wide_low,
-            wide_high,
-            turn(way((-35, 0, -5), (35, 0, -5)), 30),
-            steady=(25, 50),
-        ),
-        Scene("pocket corner", shape, low, high, pocket, step_mm=0.5, steady=(85, 112)),
-        Scene(
-            "pocket corner, turned 30°",
-            turned(shape, 30),
-            wide_low,
-            wide_high,
-            turn(pocket, 30),
-            step_mm=0.5,
-            steady=(85, 112),
-        ),
+        beside_slot,
+        beside_slot.turned(30, 33.0, 0.41),
+        stepped,
+        stepped.turned(30, 33.0),
+        in_corner,
+        in_corner.turned(30, 33.0),
     ]

@@ -291,14 +291,12 @@ def test_air_is_exactly_zero(tool, degrees):
 
 def test_standing_still_and_feed_zero_give_no_force():
     position = np.concatenate([straight((-30, 0, -5), (0, 0, -5)), np.tile([[0.0, 0, -5]], (5, 1))])
-    result = run(block((-30, -30, -20), (30, 30, 0)), position)
-    assert not result.force_N[-4:].any()
+    assert not run(block((-30, -30, -20), (30, 30, 0)), position).force_N[-4:].any()
     assert not run(block((-30, -30, -20), (30, 30, 0)), position, f_z_mm=0.0).force_N.any()
 
 
 def test_no_samples():
-    result = run(block((0, 0, -1), (1, 1, 0)), np.zeros((0, 3)))
-    assert result.force_N.shape == (0, 3)
+    assert run(block((0, 0, -1), (1, 1, 0)), np.zeros((0, 3))).force_N.shape == (0, 3)
 
 
 # --- volume ----------------------------------------------------------------------------------------------
@@ -438,8 +436,7 @@ def test_a_rapid_through_material_is_found_even_between_samples():
     field = scenes.Scene("", rib, (-20, -20), (40, 20), np.zeros((1, 3))).field(0.1)
     position = straight((-25, 0, -2), (45, 0, -2), 6.0)
     rapid = np.ones(len(position), bool)
-    result = run(field, position, rapid=rapid)
-    assert result.overlap_mm[:, 0].max() == pytest.approx(2.0)
+    assert run(field, position, rapid=rapid).overlap_mm[:, 0].max() == pytest.approx(2.0)
     assert not run(field, position, rapid=rapid).overlap_mm.any()  # it is gone
 
 

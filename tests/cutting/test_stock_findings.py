@@ -67,10 +67,8 @@ def test_a_holder_below_the_top_whose_width_is_unknown_is_said(tool, what):
     forces = run(body, {**own, **stock([-20, -20, -30], [80, 20, 0])})
     (message,) = [issue.message for issue in forces.issues if issue.code == "holder-below-top"]
     assert what in message
-    beside = run(body, {**own, **stock([-20, 9, -30], [80, 40, 0])})
-    assert not found(beside, "holder-below-top")
-    guessed = run(body, own)
-    assert [severity for severity, *_ in found(guessed, "holder-below-top")] == ["warning"]
+    assert not found(run(body, {**own, **stock([-20, 9, -30], [80, 40, 0])}), "holder-below-top")
+    assert [severity for severity, *_ in found(run(body, own), "holder-below-top")] == ["warning"]
 
 
 def test_a_wide_mill_that_plunges_is_doubted_unless_the_cell_says_that_it_can():

@@ -8,7 +8,7 @@ import pytest
 
 from gcode2krl import load_cell, plan_motion, robot
 from gcode2krl.cell.sections import Stock
-from gcode2krl.effects import Inputs, inputs_of, library
+from gcode2krl.effects import Inputs, inputs_of
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
 
@@ -28,11 +28,6 @@ M30
 """
 SAMPLES = 1500
 DT_S = 0.012
-
-
-@pytest.fixture(scope="session")
-def known():
-    return library()
 
 
 @pytest.fixture(scope="session")

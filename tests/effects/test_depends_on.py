@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from gcode2krl import load_cell
-from gcode2krl.effects import Applied, Dependence, Where, library, simulate
+from gcode2krl.effects import Applied, Dependence, Where, simulate
 from gcode2krl.effects.operators import play, since_reversal
 from gcode2krl.frames import rotation_from_quaternion
+from tests.effects import KNOWN
 
-KNOWN, CELL = library(), load_cell()
+CELL = load_cell()
 D = Dependence
 LEAST = 0.95
 """Share of the deviation's power that declared inputs explain."""

@@ -11,10 +11,7 @@ from gcode2krl.cutting import cut, no_forces
 from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.effects.apply import remembered
 from gcode2krl.errors import NotUnderstoodError
-
-
-def run(inputs, known, *texts):
-    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
+from tests.effects import KNOWN, run
 
 
 def with_material(cell, **change):
@@ -37,8 +34,8 @@ PARTS = {"tangential": ("Ktc", "Kte"), "radial": ("Krc", "Kre"), "axial": ("Kac"
 
 
 @pytest.mark.parametrize("part_name", PARTS)
-def test_force_scale_is_the_cut_with_scaled_coefficients(part, milling, known, part_name):
-    signals = run(milling, known, f"force_scale:target={part_name},scale=1.35")
+def test_force_scale_is_the_cut_with_scaled_coefficients(part, milling, part_name):
+    signals = run(milling, f"force_scale:target={part_name},scale=1.35")
     scaled = edges(part.cell, **dict.fromkeys(PARTS[part_name], 1.35))
     wanted = cut(part.toolpath, part.motion, scaled)
     assert_same_cut(signals.force_base_N, wanted.force_base_N)
@@ -47,35 +44,35 @@ def test_force_scale_is_the_cut_with_scaled_coefficients(part, milling, known, p
     np.testing.assert_array_equal(signals.force_meas_base_N, signals.force_base_N)
 
 
-def test_force_scale_under_kienzle(part, known):
+def test_force_scale_under_kienzle(part):
     law = Kienzle(kc11=700.0, mc=0.25, radial_ratio=0.4, axial_ratio=0.2)
     cell = with_material(part.cell, linear_edge=None, kienzle=law)
     forces = cut(part.toolpath, part.motion, cell)
     inputs = inputs_of(replace(part, cell=cell, forces=forces))
-    together = run(inputs, known, *(f"force_scale:target={name},scale=1.5" for name in PARTS))
+    together = run(inputs, *(f"force_scale:target={name},scale=1.5" for name in PARTS))
     assert_same_cut(together.force_base_N, 1.5 * forces.force_base_N)
-    radial = run(inputs, known, "force_scale:target=radial,scale=1.5")
+    radial = run(inputs, "force_scale:target=radial,scale=1.5")
     more = law.model_copy(update={"radial_ratio": 0.6})
     wanted = cut(part.toolpath, part.motion, with_material(cell, kienzle=more))
     assert_same_cut(radial.force_base_N, wanted.force_base_N)
     with pytest.raises(NotUnderstoodError, match="no linear edge coefficients"):
-        parse("edge_force:scale=2", known, cell)
+        parse("edge_force:scale=2", KNOWN, cell)
 
 
-def test_edge_force(part, milling, known):
-    signals = run(milling, known, "edge_force:scale=2.5")
+def test_edge_force(part, milling):
+    signals = run(milling, "edge_force:scale=2.5")
     wanted = cut(part.toolpath, part.motion, edges(part.cell, Kte=2.5, Kre=2.5, Kae=2.5))
     assert_same_cut(signals.force_base_N, wanted.force_base_N)
 
 
-def test_the_tip_follows_the_true_force(milling, known):
-    signals = run(milling, known, "edge_force:scale=2.5")
+def test_the_tip_follows_the_true_force(milling):
+    signals = run(milling, "edge_force:scale=2.5")
     moved = np.abs(signals.tcp_base_mm - simulate(milling).tcp_base_mm).max()
     assert moved > 0.05
 
 
-def test_tool_wear(swinging, known):
-    signals = run(swinging, known, "tool_wear:growth_per_m=0.2")
+def test_tool_wear(swinging):
+    signals = run(swinging, "tool_wear:growth_per_m=0.2")
     step = np.diff(swinging.path_mm, prepend=0.0)
     metres, factor = 0.0, []
     for length, force in zip(step, swinging.force_base_N, strict=True):
@@ -88,8 +85,8 @@ def test_tool_wear(swinging, known):
 
 @pytest.mark.parametrize("offset_mm", [1.5, -0.75])
 @pytest.mark.parametrize("axis", ["x", "y"])
-def test_stock_offset_is_the_cut_of_a_block_that_lies_elsewhere(part, milling, known, axis, offset_mm):
-    signals = run(milling, known, f"stock_offset:target={axis},offset_mm={offset_mm}")
+def test_stock_offset_is_the_cut_of_a_block_that_lies_elsewhere(part, milling, axis, offset_mm):
+    signals = run(milling, f"stock_offset:target={axis},offset_mm={offset_mm}")
     shift = offset_mm * np.eye(3)["xy".index(axis)]
     box = tuple(tuple(np.add(corner, shift)) for corner in part.cell.stock.box_mm)
     block = Stock(box_mm=box, resolution_mm=part.cell.stock.resolution_mm)
@@ -99,8 +96,8 @@ def test_stock_offset_is_the_cut_of_a_block_that_lies_elsewhere(part, milling, k
     assert np.abs(signals.force_base_N - part.forces.force_base_N).max() > 10.0
 
 
-def test_tool_diameter(part, milling, known):
-    signals = run(milling, known, "tool_diameter:offset_mm=0.4")
+def test_tool_diameter(part, milling):
+    signals = run(milling, "tool_diameter:offset_mm=0.4")
     tool = part.cell.tool[1]
     larger = {**part.cell.tool, 1: tool.model_copy(update={"diameter_mm": tool.diameter_mm + 0.4})}
     wanted = cut(part.toolpath, part.motion, part.cell.model_copy(update={"tool": larger}))
@@ -129,7 +126,7 @@ def idle_edge_force(runout, angle_rad, f_z, teeth, a_p, k_te, k_re, k_ae, start,
 @pytest.mark.parametrize("angle_deg", [0.0, 60.0, 100.0])
 @pytest.mark.parametrize("runout_mm", [0.005, 0.02, 0.08])
 @pytest.mark.parametrize(("start", "end"), [(0.0, np.pi), (0.0, np.pi / 2), (np.pi / 2, np.pi)])
-def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, angle_deg, start, end):
+def test_runout_drops_the_edge_force_of_idle_teeth(part, runout_mm, angle_deg, start, end):
     """A straight cut along +x with 13,000 rpm, 25 mm/s: f_z = 0.0385 mm with three teeth."""
     count, tool = 5, part.cell.tool[1]
     rows = slice(100, 100 + count)
@@ -160,7 +157,7 @@ def test_runout_drops_the_edge_force_of_idle_teeth(part, known, runout_mm, angle
         force_base_N=np.zeros((count, 3)),
         moment_base_Nmm=np.zeros((count, 3)),
     )
-    signals = run(inputs, known, f"runout:runout_mm={runout_mm},angle_deg={angle_deg}")
+    signals = run(inputs, f"runout:runout_mm={runout_mm},angle_deg={angle_deg}")
     law, f_z = part.cell.material.linear_edge, 25.0 / (13000 / 60) / tool.teeth
     feed, normal, axial = idle_edge_force(
         runout_mm, np.radians(angle_deg), f_z, tool.teeth, 2.0, law.Kte, law.Kre, law.Kae or 0.0, start, end
@@ -175,40 +172,39 @@ def flange(inputs):
     return Rotation.from_quat(inputs.rotation).as_matrix() @ tool.T
 
 
-def test_force_offset_is_along_the_flange(swinging, known):
-    signals = run(swinging, known, "force_offset:fx_N=5,fy_N=-3,fz_N=8")
+def test_force_offset_is_along_the_flange(swinging):
+    signals = run(swinging, "force_offset:fx_N=5,fy_N=-3,fz_N=8")
     wanted = np.einsum("nij,j->ni", flange(swinging), [5.0, -3.0, 8.0])
     np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
     np.testing.assert_array_equal(signals.force_base_N, swinging.force_base_N)
     np.testing.assert_array_equal(signals.tcp_base_mm, simulate(swinging).tcp_base_mm)
 
 
-def test_force_drift(swinging, known):
+def test_force_drift(swinging):
     later = replace(swinging, hours=2.0)
-    signals = run(later, known, "force_drift:N_per_h=4,direction=3/0/4")
+    signals = run(later, "force_drift:N_per_h=4,direction=3/0/4")
     along = np.einsum("nij,j->ni", flange(swinging), [0.6, 0.0, 0.8])
     wanted = 4.0 * (2.0 + swinging.time_s / 3600.0)[:, None] * along
     np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
 
 
-def test_tool_weight(swinging, known):
-    signals = run(swinging, known, "tool_weight:weight_N=40")
-    apart = signals.force_meas_base_N - swinging.force_base_N
+def test_tool_weight(swinging):
+    apart = run(swinging, "tool_weight:weight_N=40").force_meas_base_N - swinging.force_base_N
     np.testing.assert_allclose(apart, np.tile([0.0, 0.0, -40.0], (len(apart), 1)), atol=1e-12)
 
 
-def test_hose_pack(swinging, known):
+def test_hose_pack(swinging):
     h0, slope = [10.0, 0.0, -5.0], [[30.0, 0.0, 5.0], [0.0, -20.0, 0.0], [7.0, 0.0, 40.0]]
     numbers = "/".join(str(value) for row in slope for value in row)
-    signals = run(swinging, known, f"hose_pack:h0_N=10/0/-5,H_N_rad={numbers}")
+    signals = run(swinging, f"hose_pack:h0_N=10/0/-5,H_N_rad={numbers}")
     pose = Rotation.from_quat(swinging.rotation)
     pull = np.array(h0) + (pose * pose[0].inv()).as_rotvec() @ np.array(slope).T
     wanted = np.einsum("nij,nj->ni", flange(swinging), pull)
     np.testing.assert_allclose(signals.force_meas_base_N - swinging.force_base_N, wanted, atol=1e-9)
 
 
-def test_force_delay(swinging, known):
-    signals = run(swinging, known, "force_delay:delay_s=0.03")
+def test_force_delay(swinging):
+    signals = run(swinging, "force_delay:delay_s=0.03")
     np.testing.assert_allclose(
         signals.force_meas_base_N[10:, 0],
         np.interp(swinging.time_s[10:] - 0.03, swinging.time_s, swinging.force_base_N[:, 0]),
@@ -217,12 +213,12 @@ def test_force_delay(swinging, known):
     assert not signals.clocks
 
 
-def test_without_forces_there_is_a_word_about_it(part, known):
+def test_without_forces_there_is_a_word_about_it(part):
     bare = inputs_of(replace(part, forces=None, deflection=None))
     assert bare.offers == {"plan"}
     with pytest.raises(NotUnderstoodError, match="how the part is cut"):
-        run(bare, known, "force_scale:target=radial,scale=2")
-    assert run(bare, known, "tool_diameter:offset_mm=1").radius_offset_mm == 0.5
+        run(bare, "force_scale:target=radial,scale=2")
+    assert run(bare, "tool_diameter:offset_mm=1").radius_offset_mm == 0.5
 
 
 def test_the_material_is_removed_once(part):
@@ -246,12 +242,12 @@ def test_the_material_is_removed_once(part):
         assert len(calls) == before + 3
 
 
-def test_a_collision_is_half_a_sine_that_bends_the_arm(swinging, known):
+def test_a_collision_is_half_a_sine_that_bends_the_arm(swinging):
     """2 kN for 50 ms, its impulse 2·T/pi·F whatever the samples, in the run of its time and in no other."""
     for hours, at_s in ((0.0, 8.003), (0.5, 1808.003)):
         inputs = replace(swinging, hours=hours)
         text = f"collision:at_s={at_s},size_N=2000,lasts_s=0.05,direction=0/0/-3"
-        signals = run(inputs, known, text)
+        signals = run(inputs, text)
         push = signals.force_meas_base_N - inputs.force_base_N
         assert not push[:, :2].any()
         t = inputs.time_s
@@ -260,13 +256,13 @@ def test_a_collision_is_half_a_sine_that_bends_the_arm(swinging, known):
         assert np.sum(push[:, 2]) * 0.012 == pytest.approx(-2000.0 * 2.0 * 0.05 / np.pi, rel=1e-9)
         pushed = simulate(replace(inputs, load_base_N=inputs.force_base_N + push))
         np.testing.assert_allclose(signals.tcp_base_mm, pushed.tcp_base_mm, atol=1e-9)
-    elsewhere = run(replace(swinging, hours=0.25), known, text)
+    elsewhere = run(replace(swinging, hours=0.25), text)
     np.testing.assert_array_equal(elsewhere.force_meas_base_N, swinging.force_base_N)
 
 
-def test_a_collision_leaves_a_step_where_one_is_stated(swinging, known):
+def test_a_collision_leaves_a_step_where_one_is_stated(swinging):
     texts = ("collision:at_s=8,size_N=1150,direction=1/0/0", "step:target=A2,at_s=8,size_deg=0.0225")
-    signals = run(swinging, known, *texts)
+    signals = run(swinging, *texts)
     later = swinging.time_s > 8.2
     np.testing.assert_allclose(
         (signals.q_load_rad - swinging.q_cmd_rad)[later, 1], 0.0225 * np.pi / 180.0, atol=1e-12
@@ -274,9 +270,9 @@ def test_a_collision_leaves_a_step_where_one_is_stated(swinging, known):
     np.testing.assert_array_equal(signals.force_base_N[later], swinging.force_base_N[later])
 
 
-def test_a_spindle_that_droops_cuts_thicker_chips(part, milling, known):
+def test_a_spindle_that_droops_cuts_thicker_chips(part, milling):
     """The material removed again with every sample's own speed, by the law at the thicker chip."""
-    signals = run(milling, known, "spindle_droop:percent_per_Nm=8")
+    signals = run(milling, "spindle_droop:percent_per_Nm=8")
     torque = part.forces.torque_Nmm / 1000.0
     cuts = part.forces.force_base_N.any(axis=1)
     assert torque.max() > 0.3
@@ -292,16 +288,16 @@ def test_a_spindle_that_droops_cuts_thicker_chips(part, milling, known):
     assert more[cuts].sum() == pytest.approx(told[cuts].sum(), rel=0.03)
     np.testing.assert_array_equal(signals.force_base_N[~cuts], part.forces.force_base_N[~cuts])
     with pytest.raises(NotUnderstoodError, match="allowed: 0 or more"):
-        parse("spindle_droop:percent_per_Nm=-1", known, part.cell)
+        parse("spindle_droop:percent_per_Nm=-1", KNOWN, part.cell)
 
 
-def test_a_sensor_reads_more_on_the_way_back(swinging, known):
+def test_a_sensor_reads_more_on_the_way_back(swinging):
     """Up to ± 400 N and back: without a load it reads 1 % of that too much, or too little."""
     t = swinging.time_s
     up = np.interp(t, [0.0, 4.0, 8.0, 12.0, 16.0], [0.0, 400.0, 0.0, -400.0, 0.0])
     turned = np.einsum("nij,j->ni", swinging.sensor_rotation, [0.0, 1.0, 0.0]) * up[:, None]
     inputs = replace(swinging, force_base_N=turned)
-    signals = run(inputs, known, "force_hysteresis:loss_percent=2")
+    signals = run(inputs, "force_hysteresis:loss_percent=2")
     seen = np.einsum("nji,nj->ni", inputs.sensor_rotation, signals.force_meas_base_N)
     np.testing.assert_allclose(seen[:, [0, 2]], 0.0, atol=1e-9)
     lost = up - seen[:, 1]
@@ -312,11 +308,11 @@ def test_a_sensor_reads_more_on_the_way_back(swinging, known):
     np.testing.assert_array_equal(signals.force_base_N, turned)
 
 
-def test_a_reading_in_steps_is_the_nearest_one(swinging, known):
-    signals = run(swinging, known, "force_steps:step_N=20")
+def test_a_reading_in_steps_is_the_nearest_one(swinging):
+    signals = run(swinging, "force_steps:step_N=20")
     seen = np.einsum("nji,nj->ni", swinging.sensor_rotation, signals.force_meas_base_N)
     true = np.einsum("nji,nj->ni", swinging.sensor_rotation, swinging.force_base_N)
     np.testing.assert_allclose(seen / 20.0, np.round(true / 20.0), atol=1e-9)
     rows = np.abs(true).max(axis=1) > 60.0
     assert np.sqrt(np.mean((seen - true)[rows] ** 2)) == pytest.approx(20.0 / np.sqrt(12.0), rel=0.1)
-    assert not known["force_steps"].searched("force", None, frozenset({"force"}))
+    assert not KNOWN["force_steps"].searched("force", None, frozenset({"force"}))

@@ -14,12 +14,9 @@ from gcode2krl.effects import inputs_of, parse, simulate
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.gcode import read_stream
 from gcode2krl.pipeline import predict_toolpath
+from tests.effects import KNOWN, moved_by, run
 
 DEG = np.pi / 180.0
-
-
-def run(inputs, known, *texts):
-    return simulate(inputs, [parse(text, known, inputs.cell) for text in texts])
 
 
 def standing(q, inputs):
@@ -28,8 +25,8 @@ def standing(q, inputs):
     return robot.forward(q, inputs.cell)[0] + deflection_of(q, *load, np.zeros(3), inputs.cell, 1)[0]
 
 
-def test_servo_lag(swinging, known):
-    signals = run(swinging, known, "servo_lag:target=A3,tau_s=0.03")
+def test_servo_lag(swinging):
+    signals = run(swinging, "servo_lag:target=A3,tau_s=0.03")
     q, t = swinging.q_cmd_rad[:, 2], swinging.time_s
     fine = np.arange(0.0, t[-1], 1e-4)
     x, y = CubicSpline(t, q)(fine), np.empty(len(fine))
@@ -44,9 +41,9 @@ def test_servo_lag(swinging, known):
     np.testing.assert_allclose(signals.tcp_base_mm, standing(signals.q_act_rad, swinging), atol=1e-9)
 
 
-def test_backlash_is_a_play_with_memory(swinging, known):
+def test_backlash_is_a_play_with_memory(swinging):
     gap = 0.04 * DEG
-    signals = run(swinging, known, "backlash:target=A2,gap_deg=0.04")
+    signals = run(swinging, "backlash:target=A2,gap_deg=0.04")
     np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
     apart = (signals.q_load_rad - signals.q_act_rad)[:, 1]
     rising = np.gradient(swinging.q_cmd_rad[:, 1]) > 0
@@ -56,8 +53,8 @@ def test_backlash_is_a_play_with_memory(swinging, known):
     assert np.abs(apart).max() <= gap / 2 + 1e-15
 
 
-def test_friction(swinging, known):
-    signals = run(swinging, known, "friction:target=A4,spike_deg=0.02,decay_s=0.2")
+def test_friction(swinging):
+    signals = run(swinging, "friction:target=A4,spike_deg=0.02,decay_s=0.2")
     apart = (signals.q_act_rad - swinging.q_cmd_rad)[:, 3]
     speed = np.gradient(swinging.q_cmd_rad[:, 3], swinging.time_s)
     turns = swinging.time_s[1:][np.diff(np.sign(speed)) != 0]
@@ -70,35 +67,33 @@ def test_friction(swinging, known):
     assert len(turns) > 3
 
 
-def test_transmission(swinging, known):
+def test_transmission(swinging):
     text = "transmission:target=A1,amplitude_deg=0.005,harmonic=2,phase=0.7"
-    signals = run(swinging, known, text)
+    signals = run(swinging, text)
     ratio = swinging.cell.robot.drives.gear_ratio[0]
     wanted = 0.005 * DEG * np.sin(2.0 * ratio * swinging.q_cmd_rad[:, 0] + 0.7)
     np.testing.assert_allclose((signals.q_load_rad - swinging.q_cmd_rad)[:, 0], wanted, atol=1e-15)
 
 
-def test_transmission_follows_the_motor_not_the_command(swinging, known):
-    signals = run(
-        swinging, known, "servo_lag:target=A1,tau_s=0.05", "transmission:target=A1,amplitude_deg=0.005"
-    )
+def test_transmission_follows_the_motor_not_the_command(swinging):
+    signals = run(swinging, "servo_lag:target=A1,tau_s=0.05", "transmission:target=A1,amplitude_deg=0.005")
     ratio = swinging.cell.robot.drives.gear_ratio[0]
     wanted = 0.005 * DEG * np.sin(ratio * signals.q_act_rad[:, 0])
     np.testing.assert_allclose((signals.q_load_rad - signals.q_act_rad)[:, 0], wanted, atol=1e-15)
 
 
-def test_transmission_needs_the_gear_ratio(cell, known):
+def test_transmission_needs_the_gear_ratio(cell):
     drives = cell.robot.drives.model_copy(update={"gear_ratio": None})
     without = cell.model_copy(update={"robot": cell.robot.model_copy(update={"drives": drives})})
     with pytest.raises(NotUnderstoodError, match=r"gear ratio of A1 .* is not known"):
-        parse("transmission:target=A1,amplitude_deg=0.005", known, without)
+        parse("transmission:target=A1,amplitude_deg=0.005", KNOWN, without)
     with pytest.raises(NotUnderstoodError, match="A9"):
-        parse("transmission:target=A9,amplitude_deg=0.005", known, cell)
+        parse("transmission:target=A9,amplitude_deg=0.005", KNOWN, cell)
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_mastering(swinging, known, joint):
-    signals = run(swinging, known, f"mastering:target=A{joint + 1},offset_deg=0.1")
+def test_mastering(swinging, joint):
+    signals = run(swinging, f"mastering:target=A{joint + 1},offset_deg=0.1")
     for shown in (signals.q_cmd_rad, signals.q_act_rad, signals.q_load_rad):
         np.testing.assert_array_equal(shown, swinging.q_cmd_rad)
     q = np.array(swinging.q_cmd_rad)
@@ -108,8 +103,8 @@ def test_mastering(swinging, known, joint):
     assert moved.max() > 0.1
 
 
-def test_wrist_coupling(swinging, known):
-    signals = run(swinging, known, "wrist_coupling:ratio=0.002")
+def test_wrist_coupling(swinging):
+    signals = run(swinging, "wrist_coupling:ratio=0.002")
     q = np.array(swinging.q_cmd_rad)
     q4, q5 = q[:, 3].copy(), q[:, 4].copy()
     q[:, 4] += 0.002 * q4
@@ -119,20 +114,19 @@ def test_wrist_coupling(swinging, known):
     np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
 
 
-def test_link_length(swinging, known):
+@pytest.mark.parametrize("name", ["a1", "a2", "c1", "c2", "c3", "c4"])
+def test_link_length(swinging, name):
     geometry = swinging.cell.robot.geometry
-    for name in ("a1", "a2", "c1", "c2", "c3", "c4"):
-        signals = run(swinging, known, f"link_length:target={name},mm=2")
-        longer = geometry.model_copy(update={f"{name}_mm": getattr(geometry, f"{name}_mm") + 2.0})
-        robot_ = swinging.cell.robot.model_copy(update={"geometry": longer})
-        position, _ = robot.forward(swinging.q_cmd_rad, swinging.cell.model_copy(update={"robot": robot_}))
-        moved = signals.tcp_base_mm - simulate(swinging).tcp_base_mm
-        np.testing.assert_allclose(moved, position - swinging.position_mm, atol=1e-9)
+    longer = geometry.model_copy(update={f"{name}_mm": getattr(geometry, f"{name}_mm") + 2.0})
+    robot_ = swinging.cell.robot.model_copy(update={"geometry": longer})
+    position, _ = robot.forward(swinging.q_cmd_rad, swinging.cell.model_copy(update={"robot": robot_}))
+    moved = moved_by(swinging, f"link_length:target={name},mm=2")
+    np.testing.assert_allclose(moved, position - swinging.position_mm, atol=1e-9)
 
 
 @pytest.mark.parametrize("target", ["tracker", "force", "controller", "q_load", "q_cmd"])
-def test_clock(swinging, known, target):
-    signals = run(swinging, known, f"clock:target={target},offset_s=0.05,skew=0.001")
+def test_clock(swinging, target):
+    signals = run(swinging, f"clock:target={target},offset_s=0.05,skew=0.001")
     stamped = {
         "tracker": ("tcp_base_mm",),
         "force": ("force_meas_base_N", "moment_meas_base_Nmm"),
@@ -151,10 +145,8 @@ def test_clock(swinging, known, target):
         np.testing.assert_allclose(signals.seen(name, np.array([stamp]))[0], values[100], rtol=1e-9)
 
 
-def test_clocks_of_table_and_column_add_up(swinging, known):
-    signals = run(
-        swinging, known, "clock:target=controller,offset_s=0.02", "clock:target=q_load,offset_s=0.03"
-    )
+def test_clocks_of_table_and_column_add_up(swinging):
+    signals = run(swinging, "clock:target=controller,offset_s=0.02", "clock:target=q_load,offset_s=0.03")
     seen = signals.seen("q_load_rad", np.array([1.0]))
     np.testing.assert_allclose(seen, signals.seen("q_act_rad", np.array([0.97])), atol=1e-12)
 
@@ -166,19 +158,18 @@ def test_the_nominal_constants_plan_the_nominal_motion(milling):
     np.testing.assert_array_equal(again.source_line, milling.source_line)
 
 
-def test_velocity_rule(cell, known):
+def test_velocity_rule(cell):
     """A move over L from rest to rest lasts L/v + v/a + k (Bigliardi et al. 2022, law of two averages)."""
     text = b"G21 G90 G61\nT1 M6\nG0 X0 Y0 Z0\nG1 X50 F3000\nY30\nX0\nM30\n"
     toolpath = read_stream(io.BytesIO(text), "part.nc", cell)
     inputs = inputs_of(predict_toolpath(toolpath, cell))
     nominal = 130.0 / 50.0 + 3 * (50.0 / 2000.0 + 0.168)
     assert inputs.time_s[-1] == pytest.approx(nominal, abs=0.013)
-    slow = run(inputs, known, "velocity_rule:k_s=0.4,acc_cp_m_s2=0.5")
+    slow = run(inputs, "velocity_rule:k_s=0.4,acc_cp_m_s2=0.5")
     assert slow.time_s[-1] == pytest.approx(130.0 / 50.0 + 3 * (50.0 / 500.0 + 0.4), abs=0.013)
-    late = run(inputs, known, "velocity_rule:k_s=0.4")
+    late = run(inputs, "velocity_rule:k_s=0.4")
     assert late.time_s[-1] == pytest.approx(nominal + 3 * (0.4 - 0.168), abs=0.013)
-    same = run(inputs, known, f"velocity_rule:acc_cp_m_s2={cell.controller.acc_cp_m_s2}")
-    assert same.inputs is inputs
+    assert run(inputs, f"velocity_rule:acc_cp_m_s2={cell.controller.acc_cp_m_s2}").inputs is inputs
 
 
 def _rests(inputs, least_s):
@@ -188,21 +179,20 @@ def _rests(inputs, least_s):
     return int(np.count_nonzero(lengths_s >= least_s))
 
 
-def test_corner(milling, known):
-    signals = run(milling, known, "corner:cdis_mm=2")
+def test_corner(milling):
+    signals = run(milling, "corner:cdis_mm=2")
     vertex = np.array([0.0, 40.0, -3.0])  # 90 degrees: the corner is d·cos(45)/2 off
     off = np.linalg.norm(signals.inputs.position_mm - vertex, axis=1).min()
     assert off == pytest.approx(2.0 * math.cos(math.pi / 4) / 2.0, abs=0.02)
     assert len(signals.time_s) == len(signals.tcp_base_mm)
 
 
-def test_advance_stop(milling, known):
-    signals = run(milling, known, "advance_stop:count=2,hold_s=0.5")
+def test_advance_stop(milling):
+    signals = run(milling, "advance_stop:count=2,hold_s=0.5")
     assert _rests(milling, 0.4) == 0
     assert _rests(signals.inputs, 0.49) == 2
     assert signals.time_s[-1] - milling.time_s[-1] > 1.0
-    none = run(milling, known, "advance_stop:count=0,hold_s=0.5")
-    assert none.inputs is milling
+    assert run(milling, "advance_stop:count=0,hold_s=0.5").inputs is milling
 
 
 def ramps(inputs, acceleration, run_s=0.4, pause_s=1.2):
@@ -216,11 +206,11 @@ def ramps(inputs, acceleration, run_s=0.4, pause_s=1.2):
     return replace(inputs, q_cmd_rad=q)
 
 
-def test_a_drive_at_its_limit_falls_behind_and_catches_up(swinging, known):
+def test_a_drive_at_its_limit_falls_behind_and_catches_up(swinging):
     """Two thirds of the acceleration of a ramp: behind by a sixth of a·t², and there within a second."""
     inputs = ramps(swinging, 1.5)
     limit = 1.0 / DEG
-    signals = run(inputs, known, f"current_limit:target=A2,limit_deg_s2={limit}")
+    signals = run(inputs, f"current_limit:target=A2,limit_deg_s2={limit}")
     behind = (inputs.q_cmd_rad - signals.q_act_rad)[:, 1]
     period = inputs.time_s % 2.0
     first = (period > 0.05) & (period < 0.39)
@@ -234,26 +224,26 @@ def test_a_drive_at_its_limit_falls_behind_and_catches_up(swinging, known):
     np.testing.assert_array_equal(signals.q_act_rad[:, others], inputs.q_cmd_rad[:, others])
 
 
-def test_a_limit_that_the_run_keeps_takes_nothing(swinging, known):
-    effect = known["current_limit"]
+def test_a_limit_that_the_run_keeps_takes_nothing(swinging):
+    effect = KNOWN["current_limit"]
     own = effect.nominal(swinging, "A2")["limit_deg_s2"]
     for limit in (own, 2.0 * own):
-        signals = run(swinging, known, f"current_limit:target=A2,limit_deg_s2={limit}")
+        signals = run(swinging, f"current_limit:target=A2,limit_deg_s2={limit}")
         np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
     assert effect.start(swinging, "A2")["limit_deg_s2"] == pytest.approx(0.8 * own)
 
 
-def test_a2_turns_a3(swinging, known):
-    signals = run(swinging, known, "axis_coupling:ratio=0.002,deg_per_kNm=0.05")
+def test_a2_turns_a3(swinging):
+    signals = run(swinging, "axis_coupling:ratio=0.002,deg_per_kNm=0.05")
     q = np.array(swinging.q_cmd_rad)
     q[:, 2] += 0.002 * q[:, 1] + 0.05 * DEG / 1000.0 * swinging.own_torque_Nm[:, 1]
     np.testing.assert_allclose(signals.q_load_rad, q, atol=1e-15)
     np.testing.assert_allclose(signals.q_true_rad, q, atol=1e-15)
     np.testing.assert_array_equal(signals.q_act_rad, swinging.q_cmd_rad)
-    assert known["axis_coupling"].joints_at(None) == {"A3"}
+    assert KNOWN["axis_coupling"].joints_at(None) == {"A3"}
 
 
-def test_a_belt_creeps_after_its_load(swinging, known):
+def test_a_belt_creeps_after_its_load(swinging):
     """A steady torque that is gone at 6 s: what has crept goes back with the time constant."""
     force = np.where(swinging.time_s[:, None] < 6.0, [0.0, 0.0, 0.0], [0.0, 0.0, 400.0])
     still = np.tile(swinging.q_cmd_rad[:1], (len(swinging), 1))
@@ -267,7 +257,7 @@ def test_a_belt_creeps_after_its_load(swinging, known):
         moment_base_Nmm=np.zeros_like(force),
         kept={},
     )
-    signals = run(inputs, known, "belt_wind_up:target=A5,deg_per_kNm=0.5,relax_s=3")
+    signals = run(inputs, "belt_wind_up:target=A5,deg_per_kNm=0.5,relax_s=3")
     torque = inputs.own_torque_Nm[:, 4] / 1000.0
     before, after = torque[0], torque[-1]
     assert abs(after - before) > 0.02
@@ -279,13 +269,13 @@ def test_a_belt_creeps_after_its_load(swinging, known):
     np.testing.assert_allclose(found, 0.5 * DEG * crept[rows], atol=0.5 * DEG * 4e-3 * abs(after - before))
     np.testing.assert_array_equal(signals.q_true_rad, signals.q_load_rad)
     with pytest.raises(NotUnderstoodError, match="allowed for belt_wind_up: A4, A5, A6"):
-        parse("belt_wind_up:target=A2,deg_per_kNm=1", known, inputs.cell)
+        parse("belt_wind_up:target=A2,deg_per_kNm=1", KNOWN, inputs.cell)
 
 
-def test_a_joint_slips_each_time_its_torque_is_large(swinging, known):
+def test_a_joint_slips_each_time_its_torque_is_large(swinging):
     torque = swinging.own_torque_Nm[:, 4]
     assert torque.min() > 0.0
-    signals = run(swinging, known, "bolt_ratchet:target=A5,step_deg=0.01,threshold_Nm=300")
+    signals = run(swinging, "bolt_ratchet:target=A5,step_deg=0.01,threshold_Nm=300")
     steps, is_high = [], torque[0] > 300.0
     for value in torque:
         rises = not is_high and value > 300.0

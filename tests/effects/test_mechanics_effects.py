@@ -8,18 +8,11 @@ import pytest
 from gcode2krl import robot
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.compliance import deflection_of
-from gcode2krl.effects import parse, simulate
+from gcode2krl.effects import simulate
 from gcode2krl.frames import rotation_from_quaternion
+from tests.effects import moved_by, run
 
 DEG = np.pi / 180.0
-
-
-def run(inputs, known, text, **more):
-    return simulate(inputs, [parse(text, known, inputs.cell)], **more)
-
-
-def moved_by(inputs, known, text):
-    return run(inputs, known, text).tcp_base_mm - simulate(inputs).tcp_base_mm
 
 
 def kuka(a, b, c):
@@ -42,8 +35,8 @@ def turned(inputs, q=None):
 FRAME = "x_mm=1,y_mm=-2,z_mm=0.5,a_deg=0.3,b_deg=-0.2,c_deg=0.1"
 
 
-def test_base_frame(swinging, known):
-    signals = run(swinging, known, f"base_frame:{FRAME}", rotation=True)
+def test_base_frame(swinging):
+    signals = run(swinging, f"base_frame:{FRAME}", rotation=True)
     r, before = kuka(0.3, -0.2, 0.1), simulate(swinging, rotation=True)
     np.testing.assert_allclose(signals.tcp_base_mm, before.tcp_base_mm @ r.T + [1.0, -2.0, 0.5], atol=1e-9)
     np.testing.assert_allclose(
@@ -54,8 +47,8 @@ def test_base_frame(swinging, known):
     np.testing.assert_array_equal(signals.q_cmd_rad, swinging.q_cmd_rad)
 
 
-def test_tool_frame(swinging, known):
-    signals = run(swinging, known, f"tool_frame:{FRAME}", rotation=True)
+def test_tool_frame(swinging):
+    signals = run(swinging, f"tool_frame:{FRAME}", rotation=True)
     before = simulate(swinging, rotation=True)
     np.testing.assert_allclose(
         signals.tcp_base_mm - before.tcp_base_mm,
@@ -69,17 +62,17 @@ def test_tool_frame(swinging, known):
     )
 
 
-def test_thermal(swinging, known):
+def test_thermal(swinging):
     later = replace(swinging, hours=0.7)
-    moved = moved_by(later, known, "thermal:mm_per_h=0.4,time_constant_h=1.5,direction=0/3/-4")
+    moved = moved_by(later, "thermal:mm_per_h=0.4,time_constant_h=1.5,direction=0/3/-4")
     hours = 0.7 + swinging.time_s / 3600.0
     wanted = (0.4 * 1.5 * (1.0 - np.exp(-hours / 1.5)))[:, None] * [0.0, 0.6, -0.8]
     np.testing.assert_allclose(moved, wanted, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", VIRTUAL_JOINTS)
-def test_stiffness(swinging, known, name):
-    signals = run(swinging, known, f"stiffness:target={name},scale=0.6")
+def test_stiffness(swinging, name):
+    signals = run(swinging, f"stiffness:target={name},scale=0.6")
     joints = dict(swinging.cell.compliance.virtual_joints)
     soft = joints[name]
     joints[name] = soft.model_copy(update={k: getattr(soft, k) * 0.6 for k in ("k_c", "k_b", "k_a")})
@@ -109,9 +102,9 @@ def torque_by_virtual_work(inputs, joint):
 
 
 @pytest.mark.parametrize("joint", [0, 1, 4, 5])
-def test_nonlinear_stiffness(swinging, known, joint):
+def test_nonlinear_stiffness(swinging, joint):
     text = f"nonlinear_stiffness:target=A{joint + 1},soft_deg=0.02,torque_Nm=80"
-    signals = run(swinging, known, text)
+    signals = run(swinging, text)
     wanted = 0.02 * DEG * np.tanh(torque_by_virtual_work(swinging, joint) / 80.0)
     extra = signals.q_true_rad - swinging.q_cmd_rad
     np.testing.assert_allclose(extra[:, joint], wanted, atol=1e-9)
@@ -140,11 +133,10 @@ def held(inputs, force, moment=0.0):
     )
 
 
-def test_hysteresis_loses_between_the_branches(swinging, known):
+def test_hysteresis_loses_between_the_branches(swinging):
     triangle = np.concatenate([np.linspace(0, 1, 50), np.linspace(1, -1, 101), np.linspace(-1, 1, 101)])
     still = held(swinging, triangle[:, None] * np.array([0.0, 400.0, 0.0]))
-    signals = run(still, known, "hysteresis:target=A1,loss_deg=0.03")
-    extra = (signals.q_true_rad - still.q_cmd_rad)[:, 0] / DEG
+    extra = (run(still, "hysteresis:target=A1,loss_deg=0.03").q_true_rad - still.q_cmd_rad)[:, 0] / DEG
     torque = torque_by_virtual_work(still, 0)
     falling, rising = 100, 201  # no force
     assert abs(torque[falling]) < 1e-6
@@ -156,14 +148,14 @@ def test_hysteresis_loses_between_the_branches(swinging, known):
     np.testing.assert_allclose(np.abs(extra).max(), 0.015, rtol=1e-6)
 
 
-def test_hysteresis_shows_nothing_without_load(swinging, known):
+def test_hysteresis_shows_nothing_without_load(swinging):
     still = held(swinging, np.zeros((20, 3)))
-    signals = run(still, known, "hysteresis:target=A1,loss_deg=0.03")
+    signals = run(still, "hysteresis:target=A1,loss_deg=0.03")
     np.testing.assert_array_equal(signals.tcp_base_mm, still.position_mm)
 
 
-def test_gravity(swinging, known):
-    signals = run(swinging, known, "gravity:payload_kg=12,cx_mm=30,cy_mm=-20,cz_mm=150")
+def test_gravity(swinging):
+    signals = run(swinging, "gravity:payload_kg=12,cx_mm=30,cy_mm=-20,cz_mm=150")
     weight = np.array([0.0, 0.0, -12.0 * 9.80665])
     lever = np.einsum("nij,j->ni", turned(swinging), [30.0, -20.0, 150.0])
     force = swinging.force_base_N + weight
@@ -174,19 +166,19 @@ def test_gravity(swinging, known):
     np.testing.assert_array_equal(signals.force_meas_base_N, swinging.force_base_N)
 
 
-def test_gravity_points_down_in_a_turned_base(cell, known, swinging):
+def test_gravity_points_down_in_a_turned_base(cell, swinging):
     base = cell.frames.base.model_copy(update={"c_deg": 90.0})
     tilted = cell.model_copy(update={"frames": cell.frames.model_copy(update={"base": base})})
     np.testing.assert_allclose(replace(swinging, cell=tilted).gravity, [0.0, -1.0, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("hz", [0.5, 3.0, 5.0])
-def test_vibration_has_the_response_of_its_mode(swinging, known, hz):
+def test_vibration_has_the_response_of_its_mode(swinging, hz):
     """Under a sine of the force the tip adds participation·(H - 1)·n·(n·d)."""
     t = np.arange(1500) * 0.012
     still = held(swinging, np.sin(2 * np.pi * hz * t)[:, None] * np.array([100.0, 0.0, 0.0]))
     text = "vibration:hz=5,damping=0.05,participation=0.4,direction=1/0/0"
-    moved = moved_by(still, known, text)
+    moved = moved_by(still, text)
     static = (simulate(still).tcp_base_mm - still.position_mm)[:, 0]
     ratio = hz / 5.0
     response = 1.0 / (1.0 - ratio**2 + 2j * 0.05 * ratio) - 1.0
@@ -195,12 +187,12 @@ def test_vibration_has_the_response_of_its_mode(swinging, known, hz):
     assert not moved[:, 1:].any()
 
 
-def test_vibration_is_driven_by_acceleration(swinging, known):
+def test_vibration_is_driven_by_acceleration(swinging):
     t = np.arange(1500) * 0.012
     still = held(swinging, np.zeros((1500, 3)))
     shaken = still.position_mm + np.sin(2 * np.pi * 1.0 * t)[:, None] * np.array([0.0, 10.0, 0.0])
     text = "vibration:hz=4,damping=0.05,participation=0.5,direction=0/1/0"
-    moved = moved_by(replace(still, position_mm=shaken), known, text)
+    moved = moved_by(replace(still, position_mm=shaken), text)
     ratio = 1.0 / 4.0
     inertia = 10.0 * ratio**2  # a/w² of the sine
     size = 0.5 * inertia / abs(1.0 - ratio**2 + 2j * 0.05 * ratio)

@@ -3,11 +3,10 @@
 import ast
 from pathlib import Path
 
-from gcode2krl.effects import library
 from tests.conftest import ROOT
+from tests.effects import KNOWN
 
 PACKAGE = ROOT / "gcode2krl"
-KNOWN = library()
 NAMES = {
     *KNOWN,
     *(name for effect in KNOWN.values() for name in (*effect.names, *effect.vectors)),

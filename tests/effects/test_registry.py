@@ -14,95 +14,42 @@ from gcode2krl.effects import Applied, Effect, Parameter, from_cell, library, pa
 from gcode2krl.effects.effect import LINKS
 from gcode2krl.errors import NotUnderstoodError
 from tests.conftest import ROOT
+from tests.effects import KNOWN
 
-KNOWN, CELL = library(), load_cell()
-TABLE = {
-    "clock": ("offset_s", "skew"),
-    "velocity_rule": ("k_s", "acc_cp_m_s2"),
-    "corner": ("cdis_mm",),
-    "advance_stop": ("count", "hold_s"),
-    "servo_lag": ("tau_s",),
-    "backlash": ("gap_deg",),
-    "friction": ("spike_deg", "decay_s"),
-    "transmission": ("amplitude_deg", "harmonic", "phase"),
-    "mastering": ("offset_deg",),
-    "wrist_coupling": ("ratio",),
-    "link_length": ("mm",),
-    "base_frame": ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"),
-    "tool_frame": ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"),
-    "thermal": ("mm_per_h", "time_constant_h", "direction"),
-    "stiffness": ("scale",),
-    "nonlinear_stiffness": ("soft_deg", "torque_Nm"),
-    "hysteresis": ("loss_deg",),
-    "gravity": ("payload_kg", "cx_mm", "cy_mm", "cz_mm"),
-    "vibration": ("hz", "damping", "participation", "direction"),
-    "force_scale": ("scale",),
-    "tool_wear": ("growth_per_m",),
-    "runout": ("runout_mm", "angle_deg"),
-    "stock_offset": ("offset_mm",),
-    "edge_force": ("scale",),
-    "force_offset": ("fx_N", "fy_N", "fz_N"),
-    "force_drift": ("N_per_h", "direction"),
-    "tool_weight": ("weight_N",),
-    "hose_pack": ("h0_N", "H_N_rad"),
-    "force_delay": ("delay_s",),
-    "tool_diameter": ("offset_mm",),
-    "step": ("at_s", "size_mm", "direction"),
-    "gear_twist": ("deg_per_kNm",),
-    "encoder_interpolation": ("amplitude_deg", "periods", "phase"),
-    "joint_eccentricity": ("amplitude_deg", "phase"),
-    "axis_parallelism": ("mrad",),
-    "spindle_growth": ("um_per_krpm", "time_constant_s"),
-    "cutter_bending": ("um_per_N",),
-    "pedestal_compliance": ("x_mrad_per_kNm", "y_mrad_per_kNm", "foot_mm", "own_weight"),
-    "cable_pull": ("N_per_deg", "direction"),
-    "tracker_drift": ("mm_per_h", "direction"),
-    "tracker_refraction": ("K_per_m", "tracker_x_m", "tracker_y_m"),
-    "dead_time": ("delay_s",),
-    "servo_gain": ("missing_share", "k_v_per_s"),
-    "jerk_feed_forward": ("per_jerk_s3", "settle_s"),
-    "current_limit": ("limit_deg_s2", "k_v_per_s"),
-    "tracker_filter": ("tau_s",),
-    "collision": ("at_s", "size_N", "lasts_s", "direction"),
-    "spindle_droop": ("percent_per_Nm",),
-    "force_hysteresis": ("loss_percent",),
-    "force_steps": ("step_N",),
-    "floor_vibration": ("hz", "amplitude_mm", "phase"),
-    "bolt_ratchet": ("step_mm", "threshold_N", "direction"),
-    "axis_coupling": ("ratio", "deg_per_kNm"),
-    "bearing_wobble": ("amplitude_mrad", "per_turn", "phase"),
-    "belt_wind_up": ("deg_per_kNm", "relax_s"),
-    "fixture_compliance": ("x_um_per_N", "y_um_per_N", "z_um_per_N", "um_per_N"),
-}
-SLIPS = (
-    "tool_number",
-    "base_number",
-    "override",
-    "rsi_on",
-    "load",
-    "absolute_accuracy",
-    "other_program",
-    "unit",
-    "swapped_tool",
-)
+CELL = load_cell()
+DOCS = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
+OWN = next(block for block in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL) if "EFFECT =" in block)
 
 
-SLIP_PARAMETERS = {"load": ("mass_kg", "dx_mm", "dy_mm", "dz_mm", "further_mm")}
+def told(text):
+    """Return the parameters of each effect in the rows of a table."""
+    rows = [row.split("|")[1:4] for row in text.splitlines() if re.match(r"\| `[a-z]", row)]
+    words = [(re.findall(r"\w+", names), re.findall(r"`([^`]*)`", given)) for names, _, given in rows]
+    return {name: set(" ".join(given).split()) for names, given in words for name in names}
 
 
-def test_the_library_has_every_effect_with_its_parameters(known):
-    for name, parameters in TABLE.items():
-        effect = known[name]
-        assert effect.kind == "cause"
-        assert set(parameters) <= {*effect.names, *effect.vectors}, name
-    for name in SLIPS:
-        assert known[name].kind == "slip"
-        assert set(SLIP_PARAMETERS.get(name, ())) <= {*known[name].names, *known[name].vectors}, name
-    assert set(known) == {*TABLE, *SLIPS}
+TABLE = re.search(r"\| effect \| targets .*?\n\n", DOCS, re.DOTALL)[0]
+CAUSES, SLIPS = map(told, TABLE.split("| **set-up slips** |"))
+TOLD = CAUSES | SLIPS | {"base_number": CAUSES["base_frame"]}
 
 
-def test_every_effect_says_what_a_diagnosis_needs(known, cell):
-    for name, effect in known.items():
+def test_the_documentation_has_every_effect():
+    assert {name for name, effect in KNOWN.items() if effect.kind == "cause"} == set(CAUSES)
+    assert {name for name, effect in KNOWN.items() if effect.kind == "slip"} == set(SLIPS)
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_documentation_has_every_parameter(name):
+    """By itself, or by the name under which several are given at once."""
+    effect = KNOWN[name]
+    given = {each for word in TOLD[name] for each in effect.vectors.get(word, (word,))}
+    assert set(effect.names) <= given
+    at_targets = [effect.at(target) for target in effect.targets(CELL)]
+    assert TOLD[name] <= {word for one in at_targets for word in (*one.names, *one.vectors)}
+
+
+def test_every_effect_says_what_a_diagnosis_needs(cell):
+    for name, effect in KNOWN.items():
         assert effect.family, name
         assert effect.links <= set(LINKS), name
         assert effect.links, name
@@ -126,8 +73,8 @@ def test_every_effect_says_what_a_diagnosis_needs(known, cell):
         ("stiffness:scale=0.8,target=linked_arm", "linked_arm", {"scale": 0.8}),
     ],
 )
-def test_texts(known, cell, text, target, values):
-    applied = parse(text, known, cell)
+def test_texts(cell, text, target, values):
+    applied = parse(text, KNOWN, cell)
     assert applied.target == target
     assert values.items() <= applied.values.items()
     assert set(applied.values) == set(applied.effect.names)
@@ -153,9 +100,9 @@ def test_texts(known, cell, text, target, values):
         ("clock:target=scanner,offset_s=1", "tracker, force, controller, q_load, q_cmd"),
     ],
 )
-def test_errors_say_what_is_allowed(known, cell, text, said):
+def test_errors_say_what_is_allowed(cell, text, said):
     with pytest.raises(NotUnderstoodError, match=said) as caught:
-        parse(text, known, cell)
+        parse(text, KNOWN, cell)
     assert caught.value.exit_code == 2
     assert text.strip() in str(caught.value)
 
@@ -167,41 +114,31 @@ def test_any_text_is_understood_or_refused(text):
             assert isinstance(parse(start + text, KNOWN, CELL), Applied)
 
 
-def test_text_of_an_effect_is_read_back(known, cell):
+def test_text_of_an_effect_is_read_back(cell):
     for text in (
         "hose_pack:h0_N=1/2/3",
         "velocity_rule:k_s=0.2",
         "tool_number:target=3",
         "tool_wear:growth_per_m=0.1",
     ):
-        applied = parse(text, known, cell)
-        again = parse(str(applied), known, cell)
+        applied = parse(text, KNOWN, cell)
+        again = parse(str(applied), KNOWN, cell)
         assert (again.effect, again.target) == (applied.effect, applied.target)
         assert str(again) == str(applied)
 
 
-def test_the_cell_file_states_effects(known, cell):
+def test_the_cell_file_states_effects(cell):
     entries = (
         EffectEntry(name="backlash", target="A2", parameters={"gap_deg": 0.02}, source="diagnosed"),
         EffectEntry(name="thermal", parameters={"mm_per_h": 0.2, "direction": (0.0, 0.0, 1.0)}),
     )
-    found = from_cell(cell.model_copy(update={"effects": entries}), known)
+    found = from_cell(cell.model_copy(update={"effects": entries}), KNOWN)
     assert [one.label for one in found] == ["backlash A2", "thermal"]
     assert found[1]["direction_z"] == 1.0
     wrong = (*entries, EffectEntry(name="backlash", target="A2", parameters={"gap": 1.0}))
     with pytest.raises(NotUnderstoodError, match=r"\[\[effects\]\] 3.*gap_deg"):
-        from_cell(cell.model_copy(update={"effects": wrong}), known)
-    assert resolve([found[0], "backlash:target=A1,gap_deg=0.1"], known, cell)[1].label == "backlash A1"
-
-
-DOCS = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
-OWN = next(block for block in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL) if "EFFECT =" in block)
-
-
-def test_the_documentation_has_every_effect(known):
-    for name, effect in known.items():
-        assert f"`{name}`" in DOCS, name
-        assert all(key in DOCS for key in TABLE.get(name, effect.names[:1])), name
+        from_cell(cell.model_copy(update={"effects": wrong}), KNOWN)
+    assert resolve([found[0], "backlash:target=A1,gap_deg=0.1"], KNOWN, cell)[1].label == "backlash A1"
 
 
 def test_an_effect_of_ones_own_takes_part(tmp_path, swinging, cell):

@@ -3,6 +3,7 @@
 import builtins
 import subprocess
 import sys
+from inspect import isfunction
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from gcode2krl import Gcode2KrlError, Issue, predict
+from gcode2krl import Gcode2KrlError, Issue
 from gcode2krl.exchange import ColumnFrame, Findings, unit_of
-from tests.conftest import ROOT
+from gcode2krl.exchange.views import VIEWS, view
 
 STAGES = ("toolpath", "targets", "motion", "joints", "forces", "deflection")
 UNITS = {
@@ -38,11 +39,6 @@ UNITS = {
     "exact_stop": None,
     "tool": None,
 }
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(ROOT / "examples" / "test_piece.nc")
 
 
 @pytest.mark.parametrize(("name", "unit"), UNITS.items())
@@ -168,3 +164,8 @@ def test_no_findings_are_an_empty_table():
     assert pa.table(nothing).num_rows == 0
     assert "no findings" in nothing._repr_html_()
     assert repr(Findings([Issue("note", "a", 0, "b")])) == "Findings(1 note)"
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_what_shows_a_result_is_there(name):
+    assert isfunction(view(name))

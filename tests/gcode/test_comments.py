@@ -122,129 +122,47 @@ def programs():
 
 # --- where a comment may stand: the grammar of LinuxCNC ---------------------------------------------------
 
+BLANK = r"[ \t\r]*"
+EXPRESSION = r"\[[^][]*\]"
+for _ in range(4):  # so deep are brackets in each other
+    EXPRESSION = rf"\[(?:[^][]|{EXPRESSION})*\]"
+NUMBER = r"[\d.+-](?:[\d.+ \t\r-]*[\d.+-])?"
+FUNCTION = rf"[a-z](?:[a-z \t\r]*[a-z])?{BLANK}{EXPRESSION}(?:{BLANK}/{BLANK}{EXPRESSION})?"
+VALUE = rf"[-+# \t\r]*(?:<[^>]*>|{EXPRESSION}|{FUNCTION}|{NUMBER})"
+BEFORE_BLOCK = re.compile(rf"(?:{BLANK}/)?(?:{BLANK}n{BLANK}{NUMBER})?", re.IGNORECASE)
+O_WORD = re.compile(rf"{BLANK}o{VALUE}(?:{BLANK}([a-z](?:[a-z \t\r]*[a-z])?))?", re.IGNORECASE)
+ARGUMENT = re.compile(BLANK + EXPRESSION, re.IGNORECASE)
+WORD = re.compile(rf"%|#{VALUE}{BLANK}={BLANK}{VALUE}|.{VALUE}", re.IGNORECASE)
 
-class Line:
-    """A line of LinuxCNC's G-code, and the columns at which its interpreter takes a comment."""
 
-    def __init__(self, text):
-        self.text, self.at, self.places = text, 0, set()
-        self.skip()
-        if self.peek() == "/":
-            self.at += 1
-        before_number = self.at
-        self.skip()
-        if self.peek() == "n":
-            self.at += 1
-            self.number()
-            before_number = self.at
-        elif not text[:before_number].strip():
-            before_number = 0
-        self.skip()
-        if self.peek() == "o":
-            self.at += 1
-            self.o_word()
-        else:
-            self.at = before_number
-            self.block()
+def behind_gap(line, at, places):
+    """Add the columns of a gap, in which comments may stand; return where it ends."""
+    while True:
+        end = re.compile(BLANK).match(line, at).end()
+        places.update(range(at, end + 1))
+        if line[end : end + 1] != "(":
+            return end
+        at = line.index(")", end) + 1
 
-    def peek(self):
-        return self.text[self.at].lower() if self.at < len(self.text) else ""
 
-    def skip(self):
-        while self.peek() and self.peek() in BLANKS:
-            self.at += 1
-
-    def gap(self):
-        """A comment may stand here, before the blanks or behind them; go behind them and a comment."""
-        start = self.at
-        self.skip()
-        self.places.update(range(start, self.at + 1))
-        while self.peek() == "(":
-            self.at = self.text.index(")", self.at) + 1
-            start = self.at
-            self.skip()
-            self.places.update(range(start, self.at + 1))
-
-    def number(self):
-        end = self.at
-        while self.peek() and self.peek() in "0123456789.+-" + BLANKS:
-            self.at += 1
-            end = end if self.text[self.at - 1] in BLANKS else self.at
-        self.at = end
-
-    def letters(self):
-        word, end = "", self.at
-        while self.peek().isalpha() or (self.peek() and self.peek() in BLANKS and word):
-            word += self.peek()
-            self.at += 1
-            end = end if self.text[self.at - 1] in BLANKS else self.at
-        self.at = end
-        return "".join(word.split())
-
-    def bracket(self):
-        depth = 0
-        while True:
-            depth += (self.peek() == "[") - (self.peek() == "]")
-            self.at += 1
-            if depth == 0:
-                return
-
-    def value(self):
-        while self.peek() and self.peek() in "+-" + BLANKS:
-            self.at += 1
-        if self.peek() == "#":
-            self.at += 1
-            self.value()
-        elif self.peek() == "<":
-            self.at = self.text.index(">", self.at) + 1
-        elif self.peek() == "[":
-            self.bracket()
-        elif self.peek().isalpha():
-            word = self.letters()
-            self.bracket()
-            if word == "atan":
-                self.at = self.text.index("[", self.at)
-                self.bracket()
-        else:
-            self.number()
-
-    def block(self):
-        self.gap()
-        while self.peek() not in ("", ";"):
-            letter = self.peek()
-            self.at += 1
-            if letter != "%":
-                self.value()
-            if letter == "#":
-                self.at = self.text.index("=", self.at) + 1
-                self.value()
-            self.gap()
-
-    def o_word(self):
-        self.skip()
-        self.value()
-        end = self.at
-        self.skip()
-        word = self.letters()
-        end = self.at if word else end
-        while True:
-            self.at = end
-            if word == "call":
-                self.gap()
-            self.skip()
-            if self.peek() != "[":
-                break
-            self.bracket()
-            end = self.at
-        self.at = end
-        self.gap()
+def gaps_of(line):
+    """Return the columns of a line of LinuxCNC's G-code at which its interpreter takes a comment."""
+    places, at = set(), BEFORE_BLOCK.match(line).end()
+    if o_word := O_WORD.match(line, at):
+        at, is_call = o_word.end(), o_word[1] and "".join(o_word[1].split()).lower() == "call"
+        while argument := ARGUMENT.match(line, behind_gap(line, at, places) if is_call else at):
+            at = argument.end()
+    at = behind_gap(line, at, places)
+    while not o_word and line[at : at + 1] != ";" and (word := WORD.match(line, at)):
+        at = behind_gap(line, word.end(), places)
+    return places
 
 
 def places_in(program, line):
     """Return the columns at which a comment is nothing: on other controls those between plain words."""
     words = WORDS.fullmatch(line) is not None and not is_o_line(line)
     if program.dialect == "linuxcnc" or (words and program.dialect != "sinumerik"):
-        return Line(line).places
+        return gaps_of(line)
     return set()
 
 

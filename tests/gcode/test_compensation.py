@@ -1,6 +1,5 @@
 """Cutter compensation: properties of the path, and what it must not stand beside."""
 
-import io
 import itertools
 import math
 from pathlib import Path
@@ -8,19 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcode2krl import Cell, Gcode2KrlError, load_cell, read_gcode
+from gcode2krl import Cell, load_cell, read_gcode
 from gcode2krl.cell.sections import Frame
-from gcode2krl.gcode import read_stream
+from tests.gcode import Control, read, refusal
 
 CHORD_MM = 0.01
 CELL = Cell.model_construct(tool={}, work_offsets={})
 
 
-def _read(tmp_path, text, cell=CELL):
-    """Return the toolpath of a program's text."""
-    path = tmp_path / "part.ngc"
-    path.write_text(text, encoding="ascii")
-    return read_gcode(path, cell, chord_tolerance_mm=CHORD_MM)
+def _read(text, cell=CELL):
+    return read(text, cell, "part.ngc", chord_tolerance_mm=CHORD_MM)
 
 
 def _contour(rng):
@@ -62,9 +58,9 @@ def _along(path_mm):
 
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("code", ["G41.1", "G42.1"])
-def test_the_path_stays_a_radius_beside_a_convex_contour(tmp_path, seed, code):
+def test_the_path_stays_a_radius_beside_a_convex_contour(seed, code):
     corners = _contour(np.random.default_rng(seed))
-    path_mm = _read(tmp_path, _program(corners, code, 6.0)).position_mm[:, :2]
+    path_mm = _read(_program(corners, code, 6.0)).position_mm[:, :2]
     beside = _along(path_mm[4:-1])  # behind the start, the rapid moves and the entry
     distance_mm = _distance_mm(beside, corners)
     assert distance_mm.max() < 3.0 + 1e-6
@@ -72,132 +68,123 @@ def test_the_path_stays_a_radius_beside_a_convex_contour(tmp_path, seed, code):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_diameter_of_zero_is_the_contour(tmp_path, seed):
+def test_a_diameter_of_zero_is_the_contour(seed):
     corners = _contour(np.random.default_rng(seed))
     plain = _program(corners, "G40", 0.0).replace("G40 D0.000000000\n", "")
-    shifted = _read(tmp_path, _program(corners, "G41.1", 0.0)).position_mm
-    np.testing.assert_allclose(shifted, _read(tmp_path, plain).position_mm, atol=1e-9)
+    shifted = _read(_program(corners, "G41.1", 0.0)).position_mm
+    np.testing.assert_allclose(shifted, _read(plain).position_mm, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_mirror_image_of_left_is_right(tmp_path, seed):
+def test_the_mirror_image_of_left_is_right(seed):
     corners = _contour(np.random.default_rng(seed))
-    left = _read(tmp_path, _program(corners, "G41.1", 6.0)).position_mm
-    right = _read(tmp_path, _program(corners * [1.0, -1.0], "G42.1", 6.0)).position_mm
+    left = _read(_program(corners, "G41.1", 6.0)).position_mm
+    right = _read(_program(corners * [1.0, -1.0], "G42.1", 6.0)).position_mm
     np.testing.assert_allclose(left[:-1], (right * [1.0, -1.0, 1.0])[:-1], atol=1e-6)
-    negative = _read(tmp_path, _program(corners, "G42.1", -6.0)).position_mm
+    negative = _read(_program(corners, "G42.1", -6.0)).position_mm
     np.testing.assert_allclose(left, negative, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_inches_are_millimetres(tmp_path, seed):
+def test_inches_are_millimetres(seed):
     corners = _contour(np.random.default_rng(seed))
-    mm = _read(tmp_path, _program(corners, "G42.1", 6.0)).position_mm
-    inch = _read(tmp_path, _program(corners, "G42.1", 6.0, inch=True)).position_mm
+    mm = _read(_program(corners, "G42.1", 6.0)).position_mm
+    inch = _read(_program(corners, "G42.1", 6.0, inch=True)).position_mm
     np.testing.assert_allclose(mm, inch, atol=1e-6)
 
 
-HEAD = "G21 G90 G17 F100\nG0 X0 Y0 Z0\n"
-ON = HEAD + "G41.1 D2\nG1 X10\n"
-TAIL = "G1 X20\nG40\nG1 X40\nM2\n"
+LINUXCNC = Control("G21 G90 G17 F100\nG0 X0 Y0 Z0\n")
+HEAD = LINUXCNC.head
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "line"),
+    ("lines", "code", "line"),
     [
-        (ON + "G10 L2 P2 X5\n" + TAIL, "cutter-on", 5),
-        (ON + "G52 X5\n" + TAIL, "cutter-on", 5),
-        (ON + "G92 X5\n" + TAIL, "cutter-on", 5),
-        (ON + "G92.1\n" + TAIL, "cutter-on", 5),
-        (ON + "G92.3\n" + TAIL, "cutter-on", 5),
-        (ON + "G43.1 Z5\n" + TAIL, "cutter-on", 5),
-        (ON + "G55\n" + TAIL, "cutter-on", 5),
-        (ON + "G28.1\n" + TAIL, "cutter-on", 5),
-        (ON + "G81 X20 Z-5 R2\n" + TAIL, "cutter-on", 5),
-        (ON + "G1 X15 Z#5421\n" + TAIL, "cutter-parameter", 5),
-        (ON + "#<a> = #<_x>\n" + TAIL, "cutter-parameter", 5),
-        (HEAD + "G20\nG41.1 D#5410\n" + TAIL, "cutter-parameter", 4),
-        (HEAD + "G10 L2 P1 R30\nG41.1 D2\n" + TAIL, "cutter-frame", 4),
+        *(
+            (f"G41.1 D2\nG1 X10\n{block}", "cutter-on", 3)
+            for block in ("G10 L2 P2 X5", "G52 X5", "G92 X5", "G92.1", "G92.3", "G43.1 Z5", "G55", "G28.1")
+        ),
+        ("G41.1 D2\nG1 X10\nG81 X20 Z-5 R2", "cutter-on", 3),
+        ("G41.1 D2\nG1 X10\nG1 X15 Z#5421", "cutter-parameter", 3),
+        ("G41.1 D2\nG1 X10\n#<a> = #<_x>", "cutter-parameter", 3),
+        ("G20\nG41.1 D#5410", "cutter-parameter", 2),
+        ("G10 L2 P1 R30\nG41.1 D2", "cutter-frame", 2),
     ],
 )
-def test_what_is_refused(tmp_path, text, code, line):
-    with pytest.raises(Gcode2KrlError) as error:
-        _read(tmp_path, text)
-    assert (error.value.issues[0].code, error.value.issues[0].line) == (code, line)
+def test_what_is_refused(lines, code, line):
+    assert LINUXCNC.refused(f"{lines}\nG1 X20\nG40\nG1 X40", CELL) == (code, line)
 
 
-def test_a_rotated_work_offset_of_the_cell_is_refused(tmp_path):
+def test_a_rotated_work_offset_of_the_cell_is_refused():
     frame = Frame(x_mm=5.0, y_mm=0.0, z_mm=0.0, a_deg=30.0, b_deg=0.0, c_deg=0.0)
     cell = Cell.model_construct(tool={}, work_offsets={"G54": frame})
-    with pytest.raises(Gcode2KrlError, match="rotated work offset"):
-        _read(tmp_path, HEAD + "G41.1 D2\n" + TAIL, cell)
+    assert "rotated work offset" in LINUXCNC.refusal("G41.1 D2\nG1 X20\nG40", cell).message
 
 
-def test_a_contour_of_a_subprogram_is_that_of_the_plain_blocks(tmp_path):
+@pytest.mark.parametrize("where", ["in the file", "beside it"])
+def test_a_contour_of_a_subprogram_is_that_of_the_plain_blocks(tmp_path, where):
     moves = "G1 X20 Y0\nG3 X30 Y10 I0 J10\nG1 Y30\nX15\nG2 X10 Y25 J-5\nG1 Y4\n"
-    plain = HEAD + "G41.1 D4\n" + moves + "G40\nG1 X0 Y50\nM2\n"
-    called = HEAD + "o1 sub\n" + moves + "o1 endsub\nG41.1 D4\no1 call\nG40\nG1 X0 Y50\nM2\n"
-    (tmp_path / "contour.ngc").write_text(f"o<contour> sub\n{moves}o<contour> endsub\n", encoding="ascii")
-    in_file = HEAD + "G41.1 D4\no<contour> call\nG40\nG1 X0 Y50\nM2\n"
-    expected = _read(tmp_path, plain).position_mm
-    np.testing.assert_allclose(_read(tmp_path, called).position_mm, expected, atol=1e-12)
-    of_file = _read(tmp_path, in_file)
-    np.testing.assert_allclose(of_file.position_mm, expected, atol=1e-12)
-    assert set(of_file.source_line[3:-1]) == {4}  # the call
-
-
-def test_a_loop_under_compensation(tmp_path):
-    looped = HEAD + "G41.1 D2\n#1 = 0\no1 while [#1 LT 4]\nG91\nG1 X20\nG1 Y20\no1 endwhile\nG90\nG40\nM2\n"
-    steps = looped.replace("o1 while", "#1 = [#1 + 1]\no1 while")  # a value that changes within the loop
-    steps = steps.replace("G1 Y20\n", "G1 Y20\n#1 = [#1 + 1]\n")
-    plain = HEAD + "G41.1 D2\nG91\n" + "G1 X20\nG1 Y20\n" * 3 + "G90\nG40\nM2\n"
-    np.testing.assert_allclose(
-        _read(tmp_path, steps).position_mm, _read(tmp_path, plain).position_mm, atol=1e-12
+    sub = f"o<contour> sub\n{moves}o<contour> endsub\n"
+    around = HEAD + "{}G41.1 D4\n{}G40\nG1 X0 Y50\nM2\n"
+    expected = _read(around.format("", moves)).position_mm
+    (tmp_path / "contour.ngc").write_text(sub, encoding="ascii")
+    (tmp_path / "part.ngc").write_text(
+        around.format(sub if where == "in the file" else "", "o<contour> call\n")
     )
+    called = read_gcode(tmp_path / "part.ngc", CELL, chord_tolerance_mm=CHORD_MM)
+    np.testing.assert_allclose(called.position_mm, expected, atol=1e-12)
+    assert where == "in the file" or set(called.source_line[3:-1]) == {4}  # the call
 
 
-def test_a_machine_with_rotary_axes_that_stand_changes_nothing(tmp_path):
-    cell = load_cell(Path(__file__).parents[2] / "examples" / "five_axis" / "cell.toml")
-    moves = "G1 X20 Y0\nG3 X30 Y10 I0 J10\nM8\nG1 X10\nY30\nG40\nG1 X0 Y50\nM2\n"
-    text = HEAD + "G41.1 D4\n" + moves
-    turned = _read(tmp_path, text, cell)
-    np.testing.assert_allclose(turned.position_mm, _read(tmp_path, text).position_mm, atol=1e-9)
-    for wrong in (text.replace("G1 X10\n", "G1 X10 A5\n"), text.replace("G41.1", "G0 A5\nG41.1")):
-        with pytest.raises(Gcode2KrlError, match="rotary axes"):
-            _read(tmp_path, wrong, cell)
+def test_a_loop_under_compensation():
+    steps = (
+        f"{HEAD}G41.1 D2\n#1 = 0\no1 while [#1 LT 4]\nG91\nG1 X20\n#1 = [#1 + 1]\nG1 Y20\n"
+        "#1 = [#1 + 1]\no1 endwhile\nG90\nG40\nM2\n"
+    )
+    plain = HEAD + "G41.1 D2\nG91\n" + "G1 X20\nG1 Y20\n" * 2 + "G90\nG40\nM2\n"
+    np.testing.assert_allclose(_read(steps).position_mm, _read(plain).position_mm, atol=1e-12)
 
 
-def test_a_tool_change_behind_g40_goes_on_from_where_the_tool_stands():
+FIVE_AXES = load_cell(Path(__file__).parents[2] / "examples" / "five_axis" / "cell.toml")
+STANDING = f"{HEAD}G41.1 D4\nG1 X20 Y0\nG3 X30 Y10 I0 J10\nM8\nG1 X10\nY30\nG40\nG1 X0 Y50\nM2\n"
+
+
+def test_a_machine_with_rotary_axes_that_stand_changes_nothing():
+    turned, plain = _read(STANDING, FIVE_AXES), _read(STANDING)
+    np.testing.assert_allclose(turned.position_mm, plain.position_mm, atol=1e-9)
+
+
+@pytest.mark.parametrize(("old", "new"), [("G1 X10\n", "G1 X10 A5\n"), ("G41.1", "G0 A5\nG41.1")])
+def test_rotary_axes_that_turn_under_compensation_are_refused(old, new):
+    assert "rotary axes" in refusal(STANDING.replace(old, new), FIVE_AXES).message
+
+
+MILL = Control("G21 G90 G17\nT1 M6\nG43 H1\nS900 M3\nG0 X0 Y0 Z2\nF100\n", cell=load_cell())
+
+
+@pytest.mark.parametrize(("change", "last_mm"), [("T1 M6\nG43 H1\n", [50, 8, 30]), ("", [50, 0, 30])])
+def test_a_tool_change_behind_g40_goes_on_from_where_the_tool_stands(change, last_mm):
     """As LinuxCNC: Z alone then moves along the tool, and does not lead back to the contour."""
-    head = "G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41 D1\nG1 X20 Y0 F500\nX50\nG40\n"
-    text = head + "{}G0 Z30\nG1 X60 Y20\nM2\n"
-    changed = read_stream(io.BytesIO(text.format("T1 M6\nG43 H1\n").encode()), "part.nc", load_cell())
-    assert changed.position_mm[-2:].tolist() == [[50.0, 8.0, 30.0], [60.0, 20.0, 30.0]]
-    kept = read_stream(io.BytesIO(text.format("").encode()), "part.nc", load_cell())
-    assert kept.position_mm[-2].tolist() == [50.0, 0.0, 30.0]
+    found = MILL.places(f"G41 D1\nG1 X20 Y0 F500\nX50\nG40\n{change}G0 Z30\nG1 X60 Y20")
+    assert found[-2:].tolist() == [last_mm, [60, 20, 30]]
 
 
-@pytest.mark.parametrize(("move", "told"), [("G4 P1", False), ("G1 X40 F300", True), ("", False)])
-def test_another_diameter_is_told_where_something_is_cut_with_it(move, told):
-    text = f"G21 G90 G17\nT1 M6\nG43 H1\nG0 X0 Y0 Z2\nG41.1 D10\n{move}\nG40\nG1 X90 F500\nM2\n"
-    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc", load_cell())
-    assert [i.line for i in toolpath.issues if i.code == "cutter-differs"] == ([5] if told else [])
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("G41.1 D10\nG4 P1\nG40\nG1 X90", []),
+        ("G41.1 D10\nG1 X40 F300\nG40\nG1 X90", [1]),
+        ("G41.1 D10\nG40\nG1 X90", []),
+        ("G41.1 D12\nG0 X20\nG40", []),
+        ("G41.1 D12\nG0 X20\nG1 Y20\nG40", [1]),
+        ("G41.1 D#5410\nG1 X20\nG40", []),
+    ],
+)
+def test_another_diameter_is_told_where_something_is_cut_with_it(lines, told):
+    issues = MILL.read(lines).issues
+    assert [i.line - MILL.head.count("\n") for i in issues if i.code == "cutter-differs"] == told
 
 
 def test_the_diameter_of_the_tool_in_the_spindle_is_a_parameter_in_mm():
     """LinuxCNC's #5410; tool 1 of the demonstration cell has 16 mm."""
-    text = "G21 G90 G17\nT1 M6\nG43 H1\nS900 M3\nG0 X0 Y0 Z0\nF100\nG41.1 D#5410\nG1 X20\nG40\nM2\n"
-    toolpath = read_stream(io.BytesIO(text.encode()), "part.ngc", load_cell())
-    assert toolpath.position_mm[-1].tolist() == [20, 8, 0]
-    assert "cutter-differs" not in {issue.code for issue in toolpath.issues}
-
-
-def test_another_diameter_is_told_where_it_cuts():
-    head = "G21 G90 G17\nT1 M6\nG43 H1\nS900 M3\nG0 X0 Y0 Z5\nF100\nG41.1 D12\n"
-
-    def codes(lines):
-        toolpath = read_stream(io.BytesIO(f"{head}{lines}\nM2\n".encode()), "part.ngc", load_cell())
-        return {issue.code for issue in toolpath.issues}
-
-    assert "cutter-differs" not in codes("G0 X20\nG40")
-    assert "cutter-differs" in codes("G0 X20\nG1 Y20\nG40")
+    assert MILL.places("G41.1 D#5410\nG1 X20\nG40")[-1].tolist() == [20, 8, 2]

@@ -1,6 +1,5 @@
 """Compensated contours with rounded and chamfered corners: against a second reading, and in closed form."""
 
-import io
 import math
 from itertools import pairwise
 
@@ -9,47 +8,49 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
+from tests.gcode import Control
+from tests.gcode import read as parsed
 from tests.reference import contour, controls
 
 RADIUS_MM = 5.0
 TOOLS = {"tool": {1: {"diameter_mm": 2 * RADIUS_MM, "teeth": 2, "length_mm": 60.0}}}
 CELL = over_demonstration(TOOLS)
-HEADS = {
-    "fanuc": "G21 G90 G17 G94\nT1 M6\nS1000 M3\nG0 X-40. Y-40. Z5.\nG1 Z0 F600\n",
-    "sinumerik": "G710 G90 G17 G94 G54\nT1 M6 D1\nS1000 M3\nG0 X-40 Y-40 Z5\nG1 Z0 F600\n",
-    "heidenhain": "0 BEGIN PGM A MM\n1 TOOL CALL 1 Z S900 F100\n2 L X-40 Y-40 Z+5 R0 FMAX M3\n3 L Z+0\n",
+CONTROLS = {
+    "fanuc": Control("G21 G90 G17 G94\nT1 M6\nS1000 M3\nG0 X-40. Y-40. Z5.\nG1 Z0 F600\n", "M30", "fanuc"),
+    "sinumerik": Control(
+        "G710 G90 G17 G94 G54\nT1 M6 D1\nS1000 M3\nG0 X-40 Y-40 Z5\nG1 Z0 F600\n", "M30", "sinumerik"
+    ),
+    "heidenhain": Control(
+        "0 BEGIN PGM A MM\n1 TOOL CALL 1 Z S900 F100\n2 L X-40 Y-40 Z+5 R0 FMAX M3\n3 L Z+0\n",
+        "99 L M30",
+        "heidenhain",
+    ),
 }
 
 
-def read(lines, dialect="sinumerik", cell=CELL):
-    """Return the path behind a head."""
-    text = f"{HEADS[dialect]}{lines}\n" + ("99 L M30" if dialect == "heidenhain" else "M30\n")
-    return text, read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect=dialect)
+READERS = {"sinumerik": "siemens", "heidenhain": "heidenhain"}
+"""Names of the second readings."""
 
 
 def way(lines, dialect="sinumerik", cell=CELL):
     """Return X and Y of the rows behind the head."""
-    return read(lines, dialect, cell)[1].position_mm[3:, :2]
+    return CONTROLS[dialect].read(lines, cell).position_mm[3:, :2]
 
 
-def refused(lines, dialect="sinumerik", cell=CELL):
-    """Return line and message of the first error behind the head, lines counted from there."""
-    with pytest.raises(Gcode2KrlError) as caught:
-        read(lines, dialect, cell)
-    first = next(issue for issue in caught.value.issues if issue.severity == "error")
-    return first.line - HEADS[dialect].count("\n"), first.message
+def assert_read_twice(lines, dialect="sinumerik"):
+    """Assert that the second reading leads to the same places; return how many there are."""
+    text = CONTROLS[dialect].text(lines)
+    ours = controls.columns(controls.places_of(parsed(text, CELL, dialect=dialect)))
+    theirs = controls.columns(getattr(controls, READERS[dialect])(text, radius=RADIUS_MM))
+    assert controls.difference(ours, theirs) is None, (ours, theirs)
+    return len(ours)
 
 
-def codes(lines):
-    """Return the codes for which lines are refused, None where they are read."""
-    try:
-        read(lines)
-    except Gcode2KrlError as error:
-        return {issue.code for issue in error.issues}
-    return None
+def refused(lines):
+    """Return line and message of the first error behind the head."""
+    first = CONTROLS["sinumerik"].errors(lines, CELL)[0]
+    return first.line, first.message
 
 
 SQUARE = "G42 G1 X0 Y-20\nY0\nX50 {}\nY50 {}\nX0 {}\nY0\nG40 X-40"
@@ -59,13 +60,7 @@ SQUARE = "G42 G1 X0 Y-20\nY0\nX50 {}\nY50 {}\nX0 {}\nY0\nG40 X-40"
 @pytest.mark.parametrize("side", ["G41", "G42"])
 @pytest.mark.parametrize("corner", ["RND=7", "CHR=6", "CHF=6", ""])
 def test_corners_of_a_compensated_contour_against_a_second_reading(code, side, corner):
-    lines = SQUARE.format(corner, corner, corner).replace("G42", f"{side} {code}")
-    text, toolpath = read(lines)
-    ours, theirs = (
-        controls.columns(controls.places_of(toolpath)),
-        controls.columns(controls.siemens(text, radius=RADIUS_MM)),
-    )
-    assert controls.difference(ours, theirs) is None, (ours, theirs)
+    assert_read_twice(SQUARE.format(corner, corner, corner).replace("G42", f"{side} {code}"))
 
 
 turns_deg = st.integers(-150, 150).filter(lambda deg: abs(deg) > 3)
@@ -86,15 +81,10 @@ def test_drawn_contours_are_the_same_in_both_readings_or_refused(bends, side, co
         lines.append(f"X{at.real:.9f} Y{at.imag:.9f} {word}")
         heading += math.radians(turn)
     program = "\n".join([*lines, "G40 X500"])
-    if (found := codes(program)) is not None:
-        assert found <= {"cutter-arc", "cutter-gouge", "dialect-statement", "end-missing", "consequences"}
-        return
-    text, toolpath = read(program)
-    ours, theirs = (
-        controls.columns(controls.places_of(toolpath)),
-        controls.columns(controls.siemens(text, radius=RADIUS_MM)),
-    )
-    assert controls.difference(ours, theirs) is None, (ours, theirs)
+    found = {issue.code for issue in CONTROLS["sinumerik"].errors(program, CELL)}
+    assert found <= {"cutter-arc", "cutter-gouge", "dialect-statement", "end-missing"}
+    if not found:
+        assert_read_twice(program)
 
 
 def distance_to(point, start, end):
@@ -180,31 +170,22 @@ def test_kont_is_refused_where_it_leads_out_too():
 
 
 def test_heidenhain_rounds_compensated_contours():
-    text, toolpath = read(
+    lines = (
         "4 L X+0 Y-20 RR F100\n5 L Y+0\n6 L X+50\n7 RND R6\n8 L Y+50\n9 CHF 4\n10 L X+0\n11 RND R3\n"
-        "12 L Y+0\n13 L X-40 R0",
-        "heidenhain",
+        "12 L Y+0\n13 L X-40 R0"
     )
-    ours, theirs = (
-        controls.columns(controls.places_of(toolpath)),
-        controls.columns(controls.heidenhain(text, radius=RADIUS_MM)),
-    )
-    assert controls.difference(ours, theirs) is None, (ours, theirs)
-    assert len(ours) > 12
+    assert assert_read_twice(lines, "heidenhain") > 12
 
 
 def test_an_arc_that_touches_what_leads_to_it_leaves_a_compensated_contour_so():
     """Along y = 0 to x = 50, and on by a quarter about (50, 20), beside which the tool has 20 - 5 mm."""
-    _, toolpath = read(
+    found = way(
         "4 L X+0 Y-20 RL F100\n5 L Y+0\n6 L X+50\n7 CT X+70 Y+20\n8 L Y+60\n9 L X+40 R0", "heidenhain"
     )
-    around = [p for p in toolpath.position_mm[:, :2] if p[0] > 50 + 1e-9 and p[1] < 20 - 1e-9]
+    around = [p for p in found if p[0] > 50 + 1e-9 and p[1] < 20 - 1e-9]
     np.testing.assert_allclose(np.hypot(*(np.array(around) - [50, 20]).T), 15, atol=1e-9)
     assert len(around) > 5
-    assert (
-        way("G41 G1 X0 Y-20\nY0\nX50\nCT X70 Y20\nG1 Y60\nG40 X40").tolist()
-        == toolpath.position_mm[3:, :2].tolist()
-    )
+    assert way("G41 G1 X0 Y-20\nY0\nX50\nCT X70 Y20\nG1 Y60\nG40 X40").tolist() == found.tolist()
 
 
 def test_fanuc_rounds_compensated_contours():

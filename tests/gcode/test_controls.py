@@ -1,6 +1,5 @@
 """What a Fanuc or a Sinumerik alone has: places worked out by hand, or from the geometry of the corner."""
 
-import io
 import math
 
 import numpy as np
@@ -8,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
+from tests.gcode import Control, refusal
 
-FANUC = "G21 G90 G17 G94\nG0 X0. Y0. Z5.\nF100\n"
-SIEMENS = "G710 G90 G17 G94 G54\nG0 X0 Y0 Z5\nF100\n"
+CONTROLS = {
+    "fanuc": Control("G21 G90 G17 G94\nG0 X0. Y0. Z5.\nF100\n", "M30", "fanuc"),
+    "sinumerik": Control("G710 G90 G17 G94 G54\nG0 X0 Y0 Z5\nF100\n", "M30", "sinumerik"),
+}
 
 
 def read(lines, dialect="sinumerik", cell=None):
-    text = f"{FANUC if dialect.startswith('fanuc') else SIEMENS}{lines}\nM30\n"
-    return read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect=dialect)
+    return CONTROLS[dialect.partition("-")[0]].read(lines, cell, dialect=dialect)
 
 
 def way(lines, dialect="sinumerik", cell=None):
@@ -26,12 +25,9 @@ def way(lines, dialect="sinumerik", cell=None):
     return read(lines, dialect, cell).position_mm[2:]
 
 
-def errors(lines, dialect="sinumerik"):
-    try:
-        read(lines, dialect)
-    except Gcode2KrlError as error:
-        return [issue for issue in error.issues if issue.severity == "error"]
-    return []
+def errors(lines, dialect="sinumerik", cell=None):
+    """Return the errors, lines counted behind the head."""
+    return CONTROLS[dialect.partition("-")[0]].errors(lines, cell, dialect=dialect)
 
 
 HALF = math.sqrt(0.5)
@@ -131,12 +127,12 @@ def test_a_corner_that_is_none_is_refused_where_it_is_named(lines):
     assert found
     assert "corner" in found[0].message
     named = next(k for k, line in enumerate(lines.split("\n")) if "RND" in line)
-    assert found[0].line == 4 + named + (1 if "RND=9" in lines else 0)
+    assert found[0].line == 1 + named + (1 if "RND=9" in lines else 0)
 
 
 def test_a_file_that_ends_behind_a_corner_is_refused():
-    with pytest.raises(Gcode2KrlError, match="corner"):
-        read_stream(io.BytesIO(f"{SIEMENS}G1 X10 RND=2\n".encode()), "part.nc", dialect="sinumerik")
+    text = CONTROLS["sinumerik"].text("G1 X10 RND=2").removesuffix("M30\n")
+    assert "corner" in refusal(text, dialect="sinumerik").message
 
 
 HOLE = [[4, 3, 2], [4, 3, -8], [4, 3, 10]]
@@ -200,26 +196,31 @@ def test_cycle82_waits_at_the_bottom_and_cycles_count_in_the_unit_and_the_shifte
 def test_a_cycle_that_says_anything_else_is_refused(line):
     found = errors(f"{line}\nG0 X1")
     assert {issue.code for issue in found} == {"dialect-statement"}
-    assert found[0].line == 4
+    assert found[0].line == 1
 
 
 def test_a_cycle_without_a_feed_has_no_feed():
     text = "G710 G90 G17 G94\nG0 X0 Y0 Z5\nMCALL CYCLE81(10,0,2,-8)\nX1\nX2\nM30\n"
-    with pytest.raises(Gcode2KrlError) as refused:
-        read_stream(io.BytesIO(text.encode()), "part.nc", dialect="sinumerik")
-    assert [(i.code, i.line) for i in refused.value.issues if i.severity == "error"] == [("no-feed", 4)]
+    found = refusal(text, dialect="sinumerik")
+    assert (found.code, found.line) == ("no-feed", 4)
+
+
+def tool_named(name):
+    return {"name": name, "diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0}
+
+
+NAMES = over_demonstration(
+    {"tool": {7: tool_named("Mill 6"), 8: tool_named("twice"), 9: tool_named("TWICE")}}
+)
 
 
 def test_a_tool_has_its_name_from_the_cell():
-    def named(number, name):
-        return {number: {"name": name, "diameter_mm": 6.0, "teeth": 2, "length_mm": 60.0}}
+    assert read('T="MILL 6" D1 M6\nG0 X1', cell=NAMES).tool[-1] == 7
 
-    cell = over_demonstration({"tool": {**named(7, "Mill 6"), **named(8, "twice"), **named(9, "TWICE")}})
-    assert read('T="MILL 6" D1 M6\nG0 X1', cell=cell).tool[-1] == 7
-    for name in ("twice", "OTHER", ""):
-        text = f'{SIEMENS}T="{name}" M6\nM30\n'
-        with pytest.raises(Gcode2KrlError, match="no tool of the cell has this name"):
-            read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect="sinumerik")
+
+@pytest.mark.parametrize("name", ["twice", "OTHER", ""])
+def test_a_name_that_leads_to_no_tool_is_refused(name):
+    assert "no tool of the cell has this name" in errors(f'T="{name}" M6', cell=NAMES)[0].message
 
 
 @pytest.mark.parametrize(
@@ -299,7 +300,7 @@ def test_a_rotation_that_says_anything_else_is_refused(lines, dialect):
 
 def test_no_zero_is_in_force_behind_g500():
     assert way("G500\nSUPA G0 Z0\nG54\nG0 X1 Y2 Z3")[-1].tolist() == [1.0, 2.0, 3.0]
-    assert [(i.code, i.line) for i in errors("G500\nX1\nX2")] == [("dialect-statement", 5)]
+    assert [(i.code, i.line) for i in errors("G500\nX1\nX2")] == [("dialect-statement", 2)]
 
 
 @pytest.mark.parametrize(

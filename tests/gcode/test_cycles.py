@@ -1,29 +1,22 @@
 """Canned cycles equal their moves written out, in every plane, unit and distance mode; findings, events."""
 
-import io
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError, load_cell
-from gcode2krl.gcode import read, read_stream
+from gcode2krl import load_cell
+from gcode2krl.gcode import read as reading
 from gcode2krl.program.checks import check_toolpath
+from tests.gcode import Control, read
 
-HEAD = "G21 G90 G17\nS1000 M3 F100\nG0 X0 Y0 Z10\n"
+CYCLES = Control("G21 G90 G17\nS1000 M3 F100\nG0 X0 Y0 Z10\n")
+HEAD = CYCLES.head
 
 
-def toolpath(text, head=HEAD, cell=None):
+def toolpath(text, head=HEAD):
     """Return the toolpath of a program."""
-    return read_stream(io.BytesIO((head + text + "\nM2\n").encode()), "part.nc", cell)
-
-
-def found(text, head=HEAD):
-    """Return the code and the line of each error."""
-    with pytest.raises(Gcode2KrlError) as caught:
-        toolpath(text, head)
-    return [(issue.code, issue.line) for issue in caught.value.issues if issue.severity == "error"]
+    return read(f"{head}{text}\nM2\n")
 
 
 def moves(table):
@@ -31,11 +24,11 @@ def moves(table):
     return table.position_mm[1:], table.feed_mm_s[1:], table.rapid[1:], table.dwell_s[1:]
 
 
-def assert_same_moves(one, other, atol=1e-9):
+def assert_same_moves(one, other):
     """Compare two toolpaths but for their lines."""
     assert len(one) == len(other)
     for first, second in zip(moves(one), moves(other), strict=True):
-        np.testing.assert_allclose(first, second, rtol=1e-12, atol=atol)
+        np.testing.assert_allclose(first, second, rtol=1e-12, atol=1e-9)
 
 
 def written_out(cycle, holes, heights, words, level, returns):
@@ -225,32 +218,29 @@ def test_without_g98_and_g99_a_warning_says_where_the_tool_stays():
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "line"),
+    ("text", "found"),
     [
-        ("G81 X1 Z-5 R2\nG91 X1 L3", "cycle-distance-changed", 5),
-        ("G81 X1 Z-5 R2\nG20 X1", "cycle-modes-changed", 5),
-        ("G81 X1 Z-5 R2\nG18 X1 Y-2 R1", "cycle-modes-changed", 5),
-        ("G82 X1 Z-5 R2 P-2", "dwell-negative", 4),
-        ("G83 X1 Z-5 R2 Q1 D-1", "cycle-clearance", 4),
-        ("G83 X1 Z-5 R2 Q1e-300", "unknown-letter", 4),
-        ("G83 X1 Z-5 R2 Q.0000000000000000001", "cycle-too-long", 4),
-        ("G83 X1 Z-5 R2 Q.001 L99999", "cycle-too-long", 4),
-        ("G81 X1 Z-99999999 R2", "too-far", 4),
-        ("G91 G81 X100 Z-5 R2 L99999", "too-far", 4),
-        ("G81 X1 Z-5 R2\nG4 P1 X2", "two-uses", 5),
-        ("G87 X1 Z-5 R2 I1 J1 K1", "unsupported-g", 4),
-        ("G88 X1 Z-5 R2 P1", "unsupported-g", 4),
+        ("G81 X1 Z-5 R2\nG91 X1 L3", [("cycle-distance-changed", 2)]),
+        ("G81 X1 Z-5 R2\nG20 X1", [("cycle-modes-changed", 2)]),
+        ("G81 X1 Z-5 R2\nG18 X1 Y-2 R1", [("cycle-modes-changed", 2)]),
+        ("G82 X1 Z-5 R2 P-2", [("dwell-negative", 1)]),
+        ("G83 X1 Z-5 R2 Q1 D-1", [("cycle-clearance", 1)]),
+        ("G83 X1 Z-5 R2 Q1e-300", [("unknown-letter", 1)]),
+        ("G83 X1 Z-5 R2 Q.0000000000000000001", [("cycle-too-long", 1)]),
+        ("G83 X1 Z-5 R2 Q.001 L99999", [("cycle-too-long", 1)]),
+        ("G81 X1 Z-99999999 R2", [("too-far", 1)]),
+        ("G91 G81 X100 Z-5 R2 L99999", [("too-far", 1)]),
+        ("G81 X1 Z-5 R2\nG4 P1 X2", [("two-uses", 2)]),
+        ("G87 X1 Z-5 R2 I1 J1 K1", [("unsupported-g", 1)]),
+        ("G88 X1 Z-5 R2 P1", [("unsupported-g", 1)]),
+        (  # one finding however many holes follow
+            "G82 X1 Z-5 R2\nX2\nX3\nG80\nG0 Z10\nG81 X1 R2",
+            [("cycle-no-dwell", 1), ("cycle-no-depth", 6)],
+        ),
     ],
 )
-def test_what_is_refused(text, code, line):
-    assert found(text) == [(code, line)]
-
-
-def test_a_refused_cycle_is_one_finding_however_many_holes_follow():
-    assert found("G82 X1 Z-5 R2\nX2\nX3\nG80\nG0 Z10\nG81 X1 R2") == [
-        ("cycle-no-dwell", 4),
-        ("cycle-no-depth", 9),
-    ]
+def test_what_is_refused(text, found):
+    assert [(issue.code, issue.line) for issue in CYCLES.errors(text)] == found
 
 
 def test_distance_mode_may_change_where_r_and_the_depth_are_written_again():
@@ -267,9 +257,9 @@ def test_the_clearance_may_be_given():
 def test_room_is_made_for_rows_and_events_of_a_block(rows, monkeypatch):
     text = "M8 G98 G83 X1 Z-50 R2 Q.1 L3\nG86 X5 Z-3 R1 P.5 L40\nG84 X7 Z-3 R2 L30"
     whole = toolpath(text)
-    monkeypatch.setattr(read, "_FIRST_ROWS", rows)
-    monkeypatch.setattr(read, "_FIRST_EVENTS", 1)
-    monkeypatch.setattr(read, "_ROOM", 0.0)
+    monkeypatch.setattr(reading, "_FIRST_ROWS", rows)
+    monkeypatch.setattr(reading, "_FIRST_EVENTS", 1)
+    monkeypatch.setattr(reading, "_ROOM", 0.0)
     again = toolpath(text)
     assert_same_moves(whole, again)
     assert whole.events == again.events
@@ -279,8 +269,8 @@ def test_room_is_made_for_rows_and_events_of_a_block(rows, monkeypatch):
 @pytest.mark.parametrize("retract", ["G98", "G99"])
 def test_as_many_rows_as_were_reserved_at_most(code, retract, monkeypatch):
     """With room for no row more than a block asks for; the checked core stops at the first one beside it."""
-    monkeypatch.setattr(read, "_FIRST_ROWS", 1)
-    monkeypatch.setattr(read, "_FIRST_EVENTS", 0)
+    monkeypatch.setattr(reading, "_FIRST_ROWS", 1)
+    monkeypatch.setattr(reading, "_FIRST_EVENTS", 0)
     words = "Q.5" if code in (73, 83) else "P.1" if code in (82, 84, 86, 89) else ""
     head = "G21 G90 G17 G94 F500 S100 M3\nG0 X0 Y0 Z10\n"
     few, many = (len(toolpath(f"{retract} G{code} X1 Z-1 R2 {words} L{n}", head)) for n in (1, 999))
@@ -288,14 +278,9 @@ def test_as_many_rows_as_were_reserved_at_most(code, retract, monkeypatch):
 
 
 @pytest.mark.parametrize("cycle", ["G89 X5. Z-4. R1. P500", "G84 X5. Z-4. R1."])
-def test_a_fanuc_feeds_up_to_r_and_rises_from_there_at_rapid_speed(cycle):
-    text = f"G21 G90 G17 G94\nS500 M3\nG0 X0. Y0. Z9.\nF120\n{{}}{cycle}\nG80\nM30\n"
-
-    def last(retract, dialect):
-        return read_stream(io.BytesIO(text.format(retract).encode()), "part.nc", dialect=dialect)
-
-    back = last("", "fanuc")
-    assert back.position_mm[-3:, 2].tolist() == [-4.0, 1.0, 9.0]
-    assert back.rapid[-3:].tolist() == [False, False, True]
-    at_r = last("G99 ", "fanuc")
-    assert at_r.position_mm[-2:, 2].tolist() == [-4.0, 1.0]
+@pytest.mark.parametrize(("retract", "up"), [("", [1, 9]), ("G99 ", [1])])
+def test_a_fanuc_feeds_up_to_r_and_rises_from_there_at_rapid_speed(cycle, retract, up):
+    text = f"G21 G90 G17 G94\nS500 M3\nG0 X0. Y0. Z9.\nF120\n{retract}{cycle}\nG80\nM30\n"
+    found = read(text, dialect="fanuc")
+    assert found.position_mm[-1 - len(up) :, 2].tolist() == [-4, *up]
+    assert found.rapid[-1 - len(up) :].tolist() == [False, False, True][: 1 + len(up)]

@@ -1,44 +1,30 @@
 """Dialects: the same motion as plain G-code says it, and nothing that is read otherwise than it is meant."""
 
-import io
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError, read_gcode
+from gcode2krl import read_gcode
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.files.program_names import DIALECT_NAMES
 from gcode2krl.gcode import dialect_marks as marks
-from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.dialects import DIALECTS, REASONS
+from tests.gcode import Control, errors, read, refusal
 
 HEAD = "G21 G90 G17\nG0 X0. Y0. Z5.\n"
+FANUC = Control(HEAD, "M30", "fanuc")
 SIEMENS = "G710 G90 G17\nG0 X0 Y0 Z5\n"
-
-
-def read(text, dialect="linuxcnc"):
-    return read_stream(io.BytesIO(text.encode()), "part.nc", dialect=dialect)
-
-
-def errors(text, dialect="linuxcnc"):
-    try:
-        read(text, dialect)
-    except Gcode2KrlError as error:
-        return [issue for issue in error.issues if issue.severity == "error"]
-    return []
+SINUMERIK = Control(SIEMENS, "M30", "sinumerik")
 
 
 def same(text, dialect, plain):
     """Assert that a program of a dialect moves as a plain one does."""
-    found, wanted = read(text, dialect), read(plain)
-    np.testing.assert_allclose(found.position_mm, wanted.position_mm, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.dwell_s, wanted.dwell_s, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(found.rapid, wanted.rapid)
-    np.testing.assert_array_equal(found.exact_stop, wanted.exact_stop)
-    np.testing.assert_array_equal(found.machine, wanted.machine)
-    np.testing.assert_allclose(found.feed_mm_s, wanted.feed_mm_s, rtol=1e-12)
+    found, wanted = read(text, dialect=dialect), read(plain)
+    for name, apart in (("position_mm", 1e-9), ("dwell_s", 1e-12), ("feed_mm_s", 1e-9)):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-12, atol=apart)
+    for name in ("rapid", "exact_stop", "machine"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
 
 
 def test_the_names_are_those_of_the_tables():
@@ -82,38 +68,43 @@ def test_a_table_is_whole(name):
         ("G1 X1. D36 F100\nD2\nX2.\n", "G1 X1 F100\nX2\n"),
     ],
 )
-def test_fanuc(text, plain):
-    same(f"%\nO0001 (PART)\n{HEAD}{text}M30\n%\n", "fanuc", f"{HEAD}{plain}M30\n")
+@pytest.mark.parametrize("name", ["O0001 (PART)", ":1234"])
+def test_fanuc(text, plain, name):
+    same(f"%\n{name}\n{HEAD}{text}M30\n%\n", "fanuc", f"{HEAD}{plain}M30\n")
 
 
 def test_an_arc_before_a_cycle_is_in_force_again_behind_g80():
-    text = f"{HEAD}G2 X10. Y0. R5. F100\nG99 G81 X5. Z-5. R1.\nG80\nX9.\nM30\n"
-    assert [issue.code for issue in errors(text, "fanuc")] == ["arc-no-centre"]
+    found = FANUC.errors("G2 X10. Y0. R5. F100\nG99 G81 X5. Z-5. R1.\nG80\nX9.")
+    assert [issue.code for issue in found] == ["arc-no-centre"]
 
 
-def test_a_program_number_may_be_written_with_a_colon():
-    same(f"%\n:1234\n{HEAD}G1 X1. F100\nM30\n%\n", "fanuc", f"{HEAD}G1 X1 F100\nM30\n")
+@pytest.mark.parametrize(
+    ("dialect", "unit", "x", "mm"),
+    [
+        ("fanuc-calculator", "G21", "100", 100.0),
+        ("fanuc-increments", "G21", "100", 0.1),
+        ("fanuc-increments", "G20", "10000", 25.4),
+    ],
+)
+def test_a_number_without_a_point_goes_by_the_dialect(dialect, unit, x, mm):
+    text = f"{unit} G90\nG0 X0 Y0 Z1.\nG1 X{x} F10.\nM30\n"
+    assert read(text, dialect=dialect).position_mm[-1, 0] == pytest.approx(mm, abs=1e-9)
 
 
-def test_a_number_without_a_point_is_never_guessed():
-    text = HEAD + "G1 X100 F500\nM30\n"
-    (issue,) = errors(text, "fanuc")
-    assert (issue.code, issue.line) == ("decimal-point", 3)
-    assert read(text, "fanuc-calculator").position_mm[-1, 0] == 100.0
-    assert read(text, "fanuc-increments").position_mm[-1, 0] == pytest.approx(0.1, abs=1e-12)
-    inch = "G20 G90\nG0 X0 Y0 Z1.\nG1 X10000 F10.\nM30\n"
-    assert read(inch, "fanuc-increments").position_mm[-1, 0] == pytest.approx(25.4, abs=1e-9)
-    assert errors("G20 G90\nG0 X0 Y0 Z1.\nG1 X1. F10\nM30\n", "fanuc")[0].code == "decimal-point"
+@pytest.mark.parametrize("lines", ["G1 X100 F500", "G20\nG1 X1. F10"])
+def test_a_number_without_a_point_is_never_guessed(lines):
+    assert FANUC.refused(lines) == ("decimal-point", 1 + lines.count("\n"))
 
 
 def test_grbl_starts_in_mm_with_g0():
     same("$H\n$X\nZ5\nX1 Y1\nG1 Z-1F100\nM2\n", "grbl", "G21\nG0 Z5\nX1 Y1\nG1 Z-1 F100\nM2\n")
-    assert not [i for i in read("$H\nX1 Y1 Z1\nM2\n", "grbl").issues if i.severity == "warning"]
+    issues = read("$H\nX1 Y1 Z1\nM2\n", dialect="grbl").issues
+    assert not [i for i in issues if i.severity == "warning"]
 
 
 @pytest.mark.parametrize("line", ["$J=G91 X10", "$32=1", "$100=250"])
 def test_grbl_settings_and_jogs_are_refused(line):
-    assert [i.code for i in errors(f"G21\n{line}\nG0 X1\nM2\n", "grbl")] == ["dialect-statement"]
+    assert [i.code for i in errors(f"G21\n{line}\nG0 X1\nM2\n", dialect="grbl")] == ["dialect-statement"]
 
 
 @pytest.mark.parametrize(
@@ -154,21 +145,18 @@ def test_sinumerik(text, plain):
     ],
 )
 def test_a_sinumerik_shifts_its_zero(text, plain):
-    same(f"{SIEMENS}{text}M30\n", "sinumerik", f"{HEAD}{plain}M30\n")
+    same(SINUMERIK.text(text), "sinumerik", f"{HEAD}{plain}M30\n")
 
 
 def test_a_shift_of_the_zero_is_told_by_its_name():
-    issues = {
-        issue.code: issue.message for issue in read(f"{SIEMENS}TRANS X10\nX0\nM30\n", "sinumerik").issues
-    }
-    assert issues == {
+    assert {issue.code: issue.message for issue in SINUMERIK.read("TRANS X10\nX0").issues} == {
         "program-offset": "TRANS moves the zero by X10 mm",
         "offset-left": "the shift by X10 mm is in force at the end",
     }
 
 
 def test_a_message_is_kept():
-    events = read(f'{SIEMENS}N10 MSG("Pocket (1); rough")\nG0 X1\nM30\n', "sinumerik").events
+    events = SINUMERIK.read('N10 MSG("Pocket (1); rough")\nG0 X1').events
     assert events[0].values == {"m": -1, "text": "Pocket (1); rough", "line": 3}
 
 
@@ -206,13 +194,11 @@ def test_a_message_is_kept():
     ],
 )
 def test_sinumerik_statements_that_are_refused(line):
-    found = errors(f"{SIEMENS}{line}\nG0 X1\nM30\n", "sinumerik")
-    assert found[0].line == 3
-    assert found[0].remedy
+    assert SINUMERIK.refused(f"{line}\nG0 X1")[1] == 1
 
 
 def test_a_word_that_counts_needs_a_known_position():
-    assert errors("G710 G90\nG0 X=IC(5)\nM30\n", "sinumerik")[0].code == "undefined-position"
+    assert refusal("G710 G90\nG0 X=IC(5)\nM30\n", dialect="sinumerik").code == "undefined-position"
 
 
 @settings(max_examples=60, deadline=None)
@@ -222,19 +208,16 @@ def test_a_word_that_counts_needs_a_known_position():
     )
 )
 def test_counted_words_are_the_points_they_lead_to(steps):
-    siemens, x, y = SIEMENS, 0.0, 0.0
-    plain = HEAD
+    siemens, plain, x, y = SIEMENS, HEAD, 0.0, 0.0
     for dx, dy, counted in steps:
         if counted:
             siemens += f"X=IC({dx / 1000}) Y=IC({dy / 1000})\n"
             x, y = x + dx / 1000, y + dy / 1000
         else:
-            siemens += f"G91 X=AC({dx / 1000}) Y=AC({dy / 1000}) G90\n".replace(" G90", "") + "G90\n"
+            siemens += f"G91 X=AC({dx / 1000}) Y=AC({dy / 1000})\nG90\n"
             x, y = dx / 1000, dy / 1000
         plain += f"X{x:.6f} Y{y:.6f}\n"
-    np.testing.assert_allclose(
-        read(siemens + "M30\n", "sinumerik").position_mm, read(plain + "M30\n").position_mm, atol=1e-6
-    )
+    same(siemens + "M30\n", "sinumerik", plain + "M30\n")
 
 
 @pytest.mark.parametrize("dialect", DIALECT_NAMES[:-1])
@@ -247,16 +230,14 @@ def test_counted_words_are_the_points_they_lead_to(steps):
     ],
 )
 def test_conversational_programs_are_one_clear_sentence(dialect, text):
-    with pytest.raises(NotUnderstoodError) as refused:
-        read(text, dialect)
-    (issue,) = refused.value.issues
+    (issue,) = errors(text, dialect=dialect)
     assert "Heidenhain" in issue.message
     assert issue.remedy == "read it with --dialect heidenhain"
 
 
 def test_a_dialect_that_is_none_is_told_which_there_are():
     with pytest.raises(NotUnderstoodError, match="fanuc-calculator"):
-        read("G21\n", "okuma")
+        read("G21\n", dialect="okuma")
 
 
 def test_a_line_that_no_dialect_reads_names_none(tmp_path):
@@ -274,9 +255,8 @@ def test_a_line_that_no_dialect_reads_names_none(tmp_path):
 def test_programs_that_compute_or_jump_are_not_of_every_dialect(dialect, line):
     """A line that is worked out is read by LinuxCNC's rules: X100 in it would be 100 mm."""
     unit = "G710" if dialect == "sinumerik" else "G21"
-    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
-    assert (found[0].code, found[0].line) == ("dialect-statement", 3)
-    assert found[0].remedy
+    found = refusal(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect=dialect)
+    assert (found.code, found.line) == ("dialect-statement", 3)
 
 
 @pytest.mark.parametrize(
@@ -301,20 +281,19 @@ def test_programs_that_compute_or_jump_are_not_of_every_dialect(dialect, line):
 )
 @pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
 def test_what_hangs_on_the_parameters_of_a_fanuc_is_refused(dialect, line):
-    assert errors(f"{HEAD}G99\n{line}\nM30\n", dialect)
+    assert FANUC.errors(f"G99\n{line}", dialect=dialect)
 
 
-def test_times_and_angles_have_their_own_increments():
-    inch = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
-    assert read(inch, "fanuc-increments").dwell_s.sum() == pytest.approx(1.5)
-    assert read(inch, "fanuc-calculator").dwell_s.sum() == pytest.approx(1500.0)
+@pytest.mark.parametrize(("dialect", "dwell_s"), [("fanuc-increments", 1.5), ("fanuc-calculator", 1500.0)])
+def test_times_have_their_own_increments(dialect, dwell_s):
+    text = "G20 G90\nG0 X0. Y0. Z1.\nG4 X1500\nM30\n"
+    assert read(text, dialect=dialect).dwell_s.sum() == pytest.approx(dwell_s)
 
 
 @pytest.mark.parametrize("dialect", ["fanuc", "fanuc-calculator", "fanuc-increments"])
 def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
-    text = "G21 G90\nG10 L2 P2 X10. Y-5. Z1.\nG55\nG0 X1. Y1. Z1.\nM30\n"
-    assert read(text, dialect).position_mm[-1].tolist() == [11.0, -4.0, 2.0]
-    assert "program-offset" not in {i.code for i in read(text, dialect).issues if i.severity == "error"}
+    found = FANUC.places("G10 L2 P2 X10. Y-5. Z1.\nG55\nG0 X1. Y1. Z1.", dialect=dialect)
+    assert found[-1].tolist() == [11.0, -4.0, 2.0]
 
 
 @pytest.mark.parametrize(
@@ -335,18 +314,21 @@ def test_a_fanuc_sets_a_work_offset_by_words_as_linuxcnc_does(dialect):
     ],
 )
 def test_what_is_not_carried_out_is_refused_with_its_own_reason(line, dialect, reason):
-    unit = "G710" if dialect == "sinumerik" else "G21"
-    found = errors(f"{unit} G90\nG0 X0. Y0. Z5.\n{line}\nG0 X1.\nM30\n", dialect)
-    assert [i.line for i in found] == [3]
+    found = (SINUMERIK if dialect == "sinumerik" else FANUC).errors(f"{line}\nG0 X1.", dialect=dialect)
+    assert [i.line for i in found] == [1]
     assert reason in found[0].message
     assert "--dialect" not in found[0].remedy
 
 
-def test_a_fanuc_program_that_leaves_g90_to_the_control_is_told():
-    def lines(text, dialect):
-        return [i.line for i in read(text, dialect).issues if i.code == "start-unnamed"]
-
-    assert lines("G21\nG0 X1. Y1. Z1.\nG90\nM30\n", "fanuc") == [2]
-    assert lines("G21 G90\nG0 X1. Y1. Z1.\nM30\n", "fanuc") == []
-    assert lines("G21\nG91 G28 Z0.\nG90 G0 X1. Y1. Z1.\nM30\n", "fanuc") == []
-    assert lines("G21\nG0 X1. Y1. Z1.\nM30\n", "linuxcnc") == []
+@pytest.mark.parametrize(
+    ("text", "dialect", "lines"),
+    [
+        ("G21\nG0 X1. Y1. Z1.\nG90\nM30\n", "fanuc", [2]),
+        ("G21 G90\nG0 X1. Y1. Z1.\nM30\n", "fanuc", []),
+        ("G21\nG91 G28 Z0.\nG90 G0 X1. Y1. Z1.\nM30\n", "fanuc", []),
+        ("G21\nG0 X1. Y1. Z1.\nM30\n", "linuxcnc", []),
+    ],
+)
+def test_a_fanuc_program_that_leaves_g90_to_the_control_is_told(text, dialect, lines):
+    issues = read(text, dialect=dialect).issues
+    assert [issue.line for issue in issues if issue.code == "start-unnamed"] == lines

@@ -3,27 +3,30 @@
 Places are worked out by hand for a tool of 10 mm, from the figures of the operator's manual.
 """
 
-import io
-
 import numpy as np
 import pytest
 
 from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
+from tests.gcode import Control
+from tests.gcode import read as parsed
 
-HEADS = {
-    "fanuc": "G21 G90 G17 G94\nT1 M6\nG43 H1\nS1000 M3\nG0 X0. Y0. Z5.\nF100\n",
-    "sinumerik": "G710 G90 G17 G94 G54\nT1 D1 M6\nD1\nS1000 M3\nG0 X0 Y0 Z5\nF100\n",
+CONTROLS = {
+    "fanuc": Control("G21 G90 G17 G94\nT1 M6\nG43 H1\nS1000 M3\nG0 X0. Y0. Z5.\nF100\n", "M30", "fanuc"),
+    "sinumerik": Control(
+        "G710 G90 G17 G94 G54\nT1 D1 M6\nD1\nS1000 M3\nG0 X0 Y0 Z5\nF100\n", "M30", "sinumerik"
+    ),
 }
 TOOL = {1: {"diameter_mm": 10.0, "teeth": 2, "length_mm": 60.0}}
 
 
-def read(lines, lead_in="a", holds="radius", dialect="fanuc", **program):
+def cell_of(lead_in="a", holds="radius", **program):
     cutter = {"cutter": {"lead_in": lead_in, "d": holds}} if lead_in else {}
-    cell = over_demonstration({"program": cutter | program, "tool": TOOL})
-    text = f"{HEADS[dialect]}{lines}\nM30\n"
-    return read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect=dialect)
+    return over_demonstration({"program": cutter | program, "tool": TOOL})
+
+
+def read(lines, *stated, dialect="fanuc"):
+    return CONTROLS[dialect].read(lines, cell_of(*stated))
 
 
 def way(lines, *stated, **more):
@@ -31,12 +34,9 @@ def way(lines, *stated, **more):
     return read(lines, *stated, **more).position_mm[2:, :2].round(9).tolist()
 
 
-def errors(lines, *stated, **more):
-    try:
-        read(lines, *stated, **more)
-    except Gcode2KrlError as error:
-        return [(issue.code, issue.line) for issue in error.issues if issue.severity == "error"]
-    return []
+def errors(lines, *stated):
+    """Return code and line of each error, lines counted behind the head."""
+    return [(i.code, i.line) for i in CONTROLS["fanuc"].errors(lines, cell_of(*stated))]
 
 
 INSIDE = "G41 D1 G1 X20.\nY20.\nX0.\nG40 Y0."
@@ -108,25 +108,25 @@ def test_d_holds_radius_diameter_or_wear():
 @pytest.mark.parametrize(
     ("lines", "stated", "found"),
     [
-        (OUTSIDE, (None,), ("dialect-code", 7)),
-        (OUTSIDE.replace("D1", "D2"), (), ("dialect-statement", 7)),
-        (OUTSIDE.replace(" D1", ""), (), ("dialect-statement", 7)),
-        ("G42 D1 G1 X20.\nY20.\nM8\nM9\nX50.", (), ("dialect-statement", 11)),
-        ("G42 D1 G1 X20.\nM8\nM9\nY20.", (), ("dialect-statement", 10)),
-        ("G42 D1 G1 X20.\nY20.\nG40\nZ9.", (), ("dialect-statement", 10)),
-        ("G42 D1 G2 X20. Y0. I10.", (), ("dialect-statement", 7)),
-        ("G42 D1 G1 X20.\nG2 X24. I2.\nG1 Y9.", (), ("cutter-arc", 8)),
-        ("G1\nG42 D1\nM8\nX20.", ("c-a",), ("dialect-statement", 10)),
-        ("G1\nG42 D1 Z1.\nX20.", ("c-a",), ("dialect-statement", 8)),
-        ("G1\nG42 D1\nX20.\nG40 Z9.", ("c-a",), ("dialect-statement", 10)),
-        ("G1\nG42 D1\nG40\nX20.", ("c-a",), ("dialect-statement", 9)),
-        ("G1\nG42 D1\nG2 X20. I10.\nG40", ("c-a",), ("dialect-statement", 10)),
-        ("G10 L12 P1 R5.1", (), ("dialect-code", 7)),
-        ("G10 L12 P1 R5.", (None,), ("dialect-code", 7)),
-        ("G10 L11 P1 R1.", (), ("dialect-code", 7)),
-        ("G10 L10 P1 R50.", (), ("dialect-code", 7)),
-        ("G10 L12 P1 R5.", ("a", "wear"), ("dialect-code", 7)),
-        ("G41.1 D10. G1 X20.", (), ("dialect-code", 7)),
+        (OUTSIDE, (None,), ("dialect-code", 1)),
+        (OUTSIDE.replace("D1", "D2"), (), ("dialect-statement", 1)),
+        (OUTSIDE.replace(" D1", ""), (), ("dialect-statement", 1)),
+        ("G42 D1 G1 X20.\nY20.\nM8\nM9\nX50.", (), ("dialect-statement", 5)),
+        ("G42 D1 G1 X20.\nM8\nM9\nY20.", (), ("dialect-statement", 4)),
+        ("G42 D1 G1 X20.\nY20.\nG40\nZ9.", (), ("dialect-statement", 4)),
+        ("G42 D1 G2 X20. Y0. I10.", (), ("dialect-statement", 1)),
+        ("G42 D1 G1 X20.\nG2 X24. I2.\nG1 Y9.", (), ("cutter-arc", 2)),
+        ("G1\nG42 D1\nM8\nX20.", ("c-a",), ("dialect-statement", 4)),
+        ("G1\nG42 D1 Z1.\nX20.", ("c-a",), ("dialect-statement", 2)),
+        ("G1\nG42 D1\nX20.\nG40 Z9.", ("c-a",), ("dialect-statement", 4)),
+        ("G1\nG42 D1\nG40\nX20.", ("c-a",), ("dialect-statement", 3)),
+        ("G1\nG42 D1\nG2 X20. I10.\nG40", ("c-a",), ("dialect-statement", 4)),
+        ("G10 L12 P1 R5.1", (), ("dialect-code", 1)),
+        ("G10 L12 P1 R5.", (None,), ("dialect-code", 1)),
+        ("G10 L11 P1 R1.", (), ("dialect-code", 1)),
+        ("G10 L10 P1 R50.", (), ("dialect-code", 1)),
+        ("G10 L12 P1 R5.", ("a", "wear"), ("dialect-code", 1)),
+        ("G41.1 D10. G1 X20.", (), ("dialect-code", 1)),
     ],
 )
 def test_what_hangs_on_parameters_that_nobody_stated_is_refused(lines, stated, found):
@@ -148,19 +148,26 @@ def test_g10_may_set_what_the_cell_states():
     assert way(lines.format("0."), "a", "wear") == [[1, 0]]
 
 
-def test_the_cell_states_how_the_control_starts():
-    text = b"T1 M6\nG43 H1\nS9 M3\nX1. Y1. Z1.\nG1 X2. F10.\nG81 Z0. R.5\nX3.\nM30\n"
+def started(**start):
+    cell = over_demonstration({"program": {"start": start}, "tool": TOOL})
+    text = "T1 M6\nG43 H1\nS9 M3\nX1. Y1. Z1.\nG1 X2. F10.\nG81 Z0. R.5\nX3.\nM30\n"
+    return parsed(text, cell, dialect="fanuc")
 
-    def started(**start):
-        cell = over_demonstration({"program": {"start": start}, "tool": TOOL})
-        return read_stream(io.BytesIO(text), "part.nc", cell, dialect="fanuc")
 
-    inch = started(motion="G0", unit="G20", distance="G90", retract="G99")
-    np.testing.assert_allclose(inch.position_mm[-1], [3 * 25.4, 25.4, 0.5 * 25.4])
-    codes = {issue.code for issue in inch.issues}
-    assert not codes & {"start-unnamed", "unit-unnamed", "retract-unnamed"}
-    mm = started(motion="G0", retract="G98")
-    np.testing.assert_allclose(mm.position_mm[-1], [3, 1, 1])
-    assert {"start-unnamed", "unit-unnamed"} <= {issue.code for issue in mm.issues}
+@pytest.mark.parametrize(
+    ("start", "end_mm", "unnamed"),
+    [
+        ({"unit": "G20", "distance": "G90", "retract": "G99"}, [3 * 25.4, 25.4, 0.5 * 25.4], set()),
+        ({"retract": "G98"}, [3, 1, 1], {"start-unnamed", "unit-unnamed"}),
+    ],
+)
+def test_the_cell_states_how_the_control_starts(start, end_mm, unnamed):
+    found = started(motion="G0", **start)
+    np.testing.assert_allclose(found.position_mm[-1], end_mm)
+    codes = {issue.code for issue in found.issues}
+    assert codes & {"start-unnamed", "unit-unnamed", "retract-unnamed"} == unnamed
+
+
+def test_without_a_motion_mode_nothing_moves():
     with pytest.raises(Gcode2KrlError, match="motion mode"):
         started(unit="G21")

@@ -1,30 +1,27 @@
 """Heidenhain's conversational programs: places worked out by hand, and what is refused with its line."""
 
-import io
-
 import numpy as np
 import pytest
 
 from gcode2krl import Gcode2KrlError, read_gcode
-from gcode2krl.gcode import read_stream
 from tests.cells import over_demonstration
+from tests.gcode import Control
 
 HEAD = (
     "0 BEGIN PGM PART MM\n1 BLK FORM 0.1 Z X+0 Y+0 Z-20\n2 TOOL CALL 1 Z S1000 F400\n"
     "3 L X+0 Y+0 Z+5 R0 FMAX M3\n"
 )
-FIRST = HEAD.count("\n") + 1
 CELL = over_demonstration({"tool": {1: {"diameter_mm": 10.0, "teeth": 2, "length_mm": 60.0}}})
+HEIDENHAIN = Control(HEAD, "99 END PGM PART MM", "heidenhain", CELL)
 DRILL = (
     "10 CYCL DEF {} ~\n Q200=+2 ;SET-UP ~\n Q201=-8 ;DEPTH ~\n Q206=+150 ;FEED ~\n Q202=+{} ;STEP ~\n"
     " Q203=+0 ~\n Q204=+20 ;2ND{}\n"
 )
 
 
-def read(lines, head=HEAD, cell=CELL):
-    numbered = "\n".join(lines if isinstance(lines, list) else [lines])
-    text = f"{head}{numbered}\n99 END PGM PART MM\n"
-    return read_stream(io.BytesIO(text.encode()), "part.h", cell, dialect="heidenhain")
+def read(lines, cell=None):
+    """Read lines that are numbered, or numbers them from 10 on."""
+    return HEIDENHAIN.read("\n".join(lines if isinstance(lines, list) else numbered(lines)), cell)
 
 
 def way(lines):
@@ -69,12 +66,12 @@ def numbered(lines):
     ],
 )
 def test_where_a_conversational_program_leads(lines, last):
-    np.testing.assert_allclose(way(numbered(lines))[-1], last, atol=1e-8)
+    np.testing.assert_allclose(way(lines)[-1], last, atol=1e-8)
 
 
 def test_lines_feeds_and_functions_are_those_of_the_file():
-    found = read(numbered("L X+10 F300 M8\nL X+20 FMAX\nL X+30\nL X+40 FAUTO M13\nL X+50 M5 M9"))
-    assert found.source_line[2:].tolist() == [FIRST + k for k in range(5)]
+    found = read("L X+10 F300 M8\nL X+20 FMAX\nL X+30\nL X+40 FAUTO M13\nL X+50 M5 M9")
+    assert found.source_line[2:].tolist() == [5, 6, 7, 8, 9]
     assert (60 * found.feed_mm_s[2:]).tolist() == [300, np.inf, 300, 400, 400]
     assert [e.values["m"] for e in found.events if e.kind in ("spindle", "coolant")][:4] == [3, 8, 3, 8]
     assert found.tool[-1] == 1
@@ -82,7 +79,7 @@ def test_lines_feeds_and_functions_are_those_of_the_file():
 
 def test_a_compensated_contour_leads_in_at_right_angles():
     """Outside of the corner at (20, 20) the path goes by an arc of the tool's radius."""
-    found = way(numbered("L X+20 RR F100\nL Y+20 RR\nL X+0\nL Y+40 R0"))[:, :2]
+    found = way("L X+20 RR F100\nL Y+20 RR\nL X+0\nL Y+40 R0")[:, :2]
     np.testing.assert_allclose(found[[0, 1, -2, -1]], [[25, 0], [25, 20], [0, 25], [0, 40]], atol=1e-9)
     np.testing.assert_allclose(np.hypot(*(found[2:-2] - [20, 20]).T), 5, atol=1e-6)
 
@@ -131,9 +128,9 @@ PECKING = (
 
 def test_cycle_1_begins_where_the_tool_stands():
     """Strokes of 5 mm from 2 mm below; back in to 0.6 mm above the last depth."""
-    found = read(numbered(f"{PECKING}\nL Z+12 FMAX\nL X+3 FMAX M99"))
+    found = read(f"{PECKING}\nL Z+12 FMAX\nL X+3 FMAX M99")
     z = found.position_mm[:, 2].tolist()
-    without_a_move = read(numbered(f"{PECKING}\nL X+3 Z+12 FMAX\nL FMAX M99")).position_mm[:, 2]
+    without_a_move = read(f"{PECKING}\nL X+3 Z+12 FMAX\nL FMAX M99").position_mm[:, 2]
     np.testing.assert_allclose(without_a_move[-5:], z[-5:])
     np.testing.assert_allclose(z[-6:], [12, 5, 12, 5.6, 1, 12], atol=1e-9)
     assert found.dwell_s[-2] == 0.5
@@ -169,11 +166,9 @@ def test_cycle_1_begins_where_the_tool_stands():
     ],
 )
 def test_what_is_not_sure_is_refused_with_its_line(lines, line):
-    with pytest.raises(Gcode2KrlError) as refused:
-        read(numbered(lines) if "~" not in lines else [f"10 {lines}" if k == 0 else lines for k in range(1)])
-    first = next(issue for issue in refused.value.issues if issue.severity == "error")
-    assert first.line == FIRST - 1 + line
-    assert first.remedy
+    text = f"10 {lines}" if "~" in lines else "\n".join(numbered(lines))
+    assert HEIDENHAIN.errors(text)[0].line == line
+    assert HEIDENHAIN.errors(text)[0].remedy
 
 
 def test_the_marks_of_a_conversational_program_name_its_dialect(tmp_path):
@@ -186,13 +181,13 @@ def test_the_marks_of_a_conversational_program_name_its_dialect(tmp_path):
     assert read_gcode(part, CELL, dialect="heidenhain").position_mm[-1].tolist() == [1, 0, 5]
 
 
-def test_inches_are_refused_and_a_finding_quotes_the_line_of_the_file():
-    with pytest.raises(Gcode2KrlError) as refused:
-        read(["10 L X+1 FMAX"], head=HEAD.replace(" MM", " INCH"))
-    assert refused.value.issues[0].line == 1
-    with pytest.raises(Gcode2KrlError) as refused:
-        read(["10 L X+999999999 FMAX"])
-    assert "QV" not in refused.value.issues[0].excerpt
+def test_inches_are_refused():
+    inches = HEIDENHAIN._replace(head=HEAD.replace(" MM", " INCH"))
+    assert inches.refused("10 L X+1 FMAX")[1] == 1 - HEAD.count("\n")
+
+
+def test_a_finding_quotes_the_line_of_the_file():
+    assert "QV" not in HEIDENHAIN.refusal("10 L X+999999999 FMAX").excerpt
 
 
 @pytest.mark.parametrize(("preset", "code"), [(1, "G54"), (4, "G57"), (5, "G505"), (99, "G599")])

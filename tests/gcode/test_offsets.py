@@ -3,7 +3,6 @@
 Positions are compared with the same program written out: numbers shifted or points rotated by hand.
 """
 
-import io
 import math
 
 import numpy as np
@@ -11,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Cell, Gcode2KrlError
+from gcode2krl import Cell
 from gcode2krl.cell.sections import Frame
-from gcode2krl.gcode import read_stream
+from tests.gcode import errors, refusal
+from tests.gcode import read as parsed
 
 FRAME = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
 HEAD = "G21 G90 G17 F500\nG0 X0 Y0 Z0\n"
@@ -22,17 +22,13 @@ plane = st.sampled_from(("G17", "G18", "G19"))
 IN_PLANE = {"G17": "XYIJ", "G18": "ZXKI", "G19": "YZJK"}
 
 
-def read(text, cell=None):
-    """Return the toolpath of a program that ends by M2."""
-    return read_stream(io.BytesIO(f"{text}\nM2\n".encode()), "part.nc", cell)
+def read(lines, cell=None):
+    return parsed(f"{lines}\nM2\n", cell)
 
 
-def found(text, cell=None):
-    """Return code, severity and line of the findings of a program."""
-    try:
-        issues = read(text, cell).issues
-    except Gcode2KrlError as error:
-        issues = error.issues
+def found(lines, cell=None):
+    """Return code, severity and line of the findings of a program, whether it is read or not."""
+    issues = errors(f"{lines}\nM2\n", cell) or read(lines, cell).issues
     return [(issue.code, issue.severity, issue.line) for issue in issues]
 
 
@@ -158,9 +154,7 @@ def test_a_rotation_set_while_one_axis_is_known_leaves_none_known():
 
 
 def test_other_rotations_than_about_z_are_refused_by_their_key():
-    with pytest.raises(Gcode2KrlError) as caught:
-        read("G21 G0 X1", cell_with(G55={"b_deg": 5.0}))
-    (issue,) = caught.value.issues
+    issue = refusal("G21 G0 X1\nM2\n", cell_with(G55={"b_deg": 5.0}))
     assert (issue.code, "G55" in issue.message) == ("cell-key", True)
 
 
@@ -213,17 +207,21 @@ def test_a_zero_set_by_a_known_axis_needs_no_other():
 
 
 @pytest.mark.parametrize(
-    "text", ["G10 L1 P1 Z11", "T1 M6\nG43.1 Z9", "T1 M6\nG43\nG43.2 H1", "G10 L1 P1 Z-10"]
+    ("text", "differs"),
+    [
+        ("G10 L1 P1 Z11", True),
+        ("T1 M6\nG43.1 Z9", True),
+        ("T1 M6\nG43\nG43.2 H1", True),
+        ("G10 L1 P1 Z-10", True),
+        ("G10 L1 P1 Z10", False),
+        ("T1 M6\nG43.1 Z10", False),
+        ("G20 G10 L1 P1 Z.3937", False),
+        ("G43.2 H1", False),
+    ],
 )
-def test_another_length_than_the_declared_is_found(text):
-    cell = cell_with_tools(10.0)
-    assert "tool-length-differs" in [name for name, _, _ in found(HEAD + text, cell)]
-
-
-@pytest.mark.parametrize("text", ["G10 L1 P1 Z10", "T1 M6\nG43.1 Z10", "G20 G10 L1 P1 Z.3937", "G43.2 H1"])
-def test_the_declared_length_is_no_finding(text):
-    cell = cell_with_tools(10.0)
-    assert "tool-length-differs" not in [name for name, _, _ in found(HEAD + text, cell)]
+def test_another_length_than_the_declared_is_found(text, differs):
+    codes = [name for name, _, _ in found(HEAD + text, cell_with_tools(10.0))]
+    assert ("tool-length-differs" in codes) == differs
 
 
 @pytest.mark.parametrize(
@@ -252,35 +250,40 @@ def test_the_declared_length_is_no_finding(text):
     ],
 )
 def test_what_is_not_understood_is_one_finding_at_its_line(block, code):
-    cell = cell_with_tools(10.0)
-    errors = [
-        (name, line)
-        for name, severity, line in found(f"{HEAD}{block}\nG0 X1 Y1 Z1", cell)
-        if severity == "error"
-    ]
-    assert errors == [(code, 3)]
+    found = errors(f"{HEAD}{block}\nG0 X1 Y1 Z1\nM2\n", cell_with_tools(10.0))
+    assert [(issue.code, issue.line) for issue in found] == [(code, 3)]
 
 
-@pytest.mark.parametrize("shift", ["G52 X24", "G92 Y3"])
-def test_behind_a_rotation_under_a_shift_the_place_is_unknown(shift):
+SHIFTS = pytest.mark.parametrize("shift", [f"{HEAD}G52 X24\n", f"{HEAD}G92 Y3\n"])
+TURNED = "G10 L2 P1 R90\n"
+
+
+@SHIFTS
+@pytest.mark.parametrize(
+    ("block", "known"),
+    [("G0 X1", [0, 0, 1]), ("G91 G0 X1 Y2", [0, 0, 1]), ("G0 X1 Y2", [1, 1, 1])],
+)
+def test_behind_a_rotation_under_a_shift_the_place_is_unknown(shift, block, known):
     """LinuxCNC takes the tool to stand elsewhere: an axis that the next block does not name would jump."""
-    turned = f"{HEAD}{shift}\nG10 L2 P1 R90\n"
-    assert not read(turned + "G0 X1").known[-1, :2].all()
-    assert not read(turned + "G91 G0 X1 Y2").known[-1, :2].any()
-    assert read(turned + "G0 X1 Y2").known[-1].all()
-    for block in ("G0 X#5420 Y1", "G0 X#<_y> Y1", "G0 X1\nG0 Y#5421"):
-        assert ("expression-value", "error") in [
-            (code, severity) for code, severity, _ in found(turned + block)
-        ]
-    assert not [code for code, severity, _ in found(f"{turned}G0 X1 Y2\nX#5420") if severity == "error"]
-    for turn in (
-        "G10 L2 P1 R0",
-        "G10 L2 P2 R90",
-        "G10 L2 P1 X5",
-        "G92.1\nG10 L2 P1 R90",
-        "G52 X0 Y0\nG10 L2 P1 R90",
-    ):
-        assert read(f"{HEAD}{shift}\n{turn}\nG0 Z1").known[-1].all(), turn
+    assert read(shift + TURNED + block).known[-1].tolist() == known
+
+
+@SHIFTS
+@pytest.mark.parametrize(
+    ("block", "refused"),
+    [("G0 X#5420 Y1", 1), ("G0 X#<_y> Y1", 1), ("G0 X1\nG0 Y#5421", 1), ("G0 X1 Y2\nX#5420", 0)],
+)
+def test_there_its_parameters_have_no_value(shift, block, refused):
+    codes = [issue.code for issue in errors(f"{shift}{TURNED}{block}\nM2\n")]
+    assert ("expression-value" in codes) == bool(codes) == bool(refused)
+
+
+@SHIFTS
+@pytest.mark.parametrize(
+    "turn", ["G10 L2 P1 R0", "G10 L2 P2 R90", "G10 L2 P1 X5", "G92.1\n" + TURNED, "G52 X0 Y0\n" + TURNED]
+)
+def test_other_offsets_under_a_shift_leave_the_place_known(shift, turn):
+    assert read(f"{shift}{turn}\nG0 Z1").known[-1].all()
 
 
 def test_rs274_loses_a_length_in_inches_and_this_reader_does_not():

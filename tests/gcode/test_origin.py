@@ -1,14 +1,13 @@
 """Who wrote a file: foreign ones get one sentence; a control is named by its marks, and read both ways."""
 
-import io
 import time
 
 import pytest
 
-from gcode2krl import Gcode2KrlError, load_cell, read_gcode
+from gcode2krl import load_cell, read_gcode
 from gcode2krl.errors import NotUnderstoodError
-from gcode2krl.gcode import read_stream
 from gcode2krl.gcode.origin import cam_of, control_of
+from tests.gcode import errors
 
 MILL = (
     "G21 G17 G90 G94 G40 G49 G80\nG54\nT1 M6\nS8000 M3\nG43 H1 G0 Z30.\nG0 X0. Y0.\nG0 Z2.\nG1 Z-1. F300.\n"
@@ -37,11 +36,7 @@ FOREIGN = {
 
 def found(text, dialect="linuxcnc"):
     """Return the errors of a program read from a stream."""
-    try:
-        read_stream(io.BytesIO(text.encode()), "part.nc", load_cell(), dialect=dialect)
-    except Gcode2KrlError as error:
-        return error.issues
-    return ()
+    return errors(text, load_cell(), dialect=dialect)
 
 
 def refused(tmp_path, text, dialect="linuxcnc"):

@@ -1,6 +1,5 @@
 """Polar words: equal to X and Y worked out from them; refused where they have no meaning."""
 
-import io
 import math
 
 import numpy as np
@@ -8,24 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
+from tests.gcode import Control, read
 
-HEAD = "G21 G90 G17\nF100\nG0 X1 Y2 Z10\n"
+POLAR = Control("G21 G90 G17\nF100\nG0 X1 Y2 Z10\n")
 distance = st.integers(1, 50)
 angle = st.integers(-400, 400)
 
 
-def toolpath(text):
-    """Return the toolpath of a program."""
-    return read_stream(io.BytesIO((HEAD + text + "\nM2\n").encode()), "part.nc")
+toolpath = POLAR.read
 
 
 def found(text):
     """Return the code, the line and the quoted block of each error."""
-    with pytest.raises(Gcode2KrlError) as caught:
-        toolpath(text)
-    return [(issue.code, issue.line, issue.excerpt) for issue in caught.value.issues]
+    return [(issue.code, issue.line, issue.excerpt) for issue in POLAR.errors(text)]
 
 
 @given(st.lists(st.tuples(distance, angle), min_size=1, max_size=5))
@@ -74,19 +68,17 @@ def test_holes_on_a_circle():
 )
 def test_what_has_no_meaning_is_refused(text, code, excerpt):
     issues = found("G80\n" + text)
-    assert [issue[:2] for issue in issues] == [(code, 5)]
+    assert [issue[:2] for issue in issues] == [(code, 2)]
     assert excerpt is None or issues[0][2] == excerpt
 
 
 @pytest.mark.parametrize("word", ["@5", "^30", "G91 @5 ^30"])
 def test_from_the_zero_a_single_word_leads_nowhere(word):
-    ((code, line, _),) = found(f"G0 X0 Y0\nG1 {word}")
-    assert (code, line) == ("polar-zero", 5)
+    assert POLAR.refused(f"G0 X0 Y0\nG1 {word}") == ("polar-zero", 2)
 
 
 def test_a_single_polar_word_from_an_unknown_position_is_unknown():
-    table = read_stream(io.BytesIO(b"G21 G0 X5 Z3\n@7\n@7 ^30\nM2\n"), "part.nc")
-    assert table.known[2:].tolist() == [[False, False, True], [True, True, True]]
+    assert read("G21 G0 X5 Z3\n@7\n@7 ^30\nM2\n").known[2:].tolist() == [[0, 0, 1], [1, 1, 1]]
 
 
 @pytest.mark.parametrize(
@@ -111,10 +103,8 @@ def test_a_single_polar_word_from_an_unknown_position_is_unknown():
     ],
 )
 def test_what_is_never_read_says_why(code, words):
-    with pytest.raises(Gcode2KrlError) as caught:
-        toolpath(code)
-    (issue,) = caught.value.issues
-    assert (issue.code, issue.line) == ("unsupported-g", 4)
+    (issue,) = POLAR.errors(code)
+    assert (issue.code, issue.line) == ("unsupported-g", 1)
     assert words in issue.message
     assert issue.remedy
 
@@ -127,4 +117,4 @@ def test_polar_words_take_expressions():
 
 @pytest.mark.parametrize("block", ["G1 @[2] X1", "G1 @[1+1] Y[1]"])
 def test_expressions_beside_an_axis_are_refused(block):
-    assert found(block) == [("polar-and-axis", 4, f"G1 ^{block[3:]}")]
+    assert found(block) == [("polar-and-axis", 1, f"G1 ^{block[3:]}")]

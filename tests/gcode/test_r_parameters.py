@@ -1,34 +1,13 @@
 """R parameters and jumps of a Sinumerik: rows worked out by hand, and what is refused with its line."""
 
-import io
-
 import pytest
 
-from gcode2krl import Gcode2KrlError
-from gcode2krl.gcode import read_stream
+from tests.gcode import Control, named
 
-HEAD = "%_N_PART_MPF\nG710 G90 G17\nG0 X0 Y0 Z0\n"
-FIRST = HEAD.count("\n") + 1
+SINUMERIK = Control("%_N_PART_MPF\nG710 G90 G17\nG0 X0 Y0 Z0\n", "M30", "sinumerik")
 
 
-def read(text, **options):
-    return read_stream(
-        io.BytesIO(f"{HEAD}{text}\nM30\n".encode()), "part.mpf", dialect="sinumerik", **options
-    )
-
-
-def xs(text, **options):
-    """Return X of every row behind the head's."""
-    return read(text, **options).position_mm[2:, 0].tolist()
-
-
-def refused(text):
-    """Return code and line of the first error, counted from the head."""
-    with pytest.raises(Gcode2KrlError) as caught:
-        read(text)
-    first = caught.value.issues[0]
-    assert first.remedy
-    return first.code, first.line - FIRST + 1
+read, xs = SINUMERIK.read, SINUMERIK.xs
 
 
 @pytest.mark.parametrize(
@@ -67,27 +46,28 @@ def test_words_take_calculations():
     assert toolpath.dwell_s.sum() == 0.5
 
 
-def test_a_frame_may_be_shifted_by_a_parameter():
-    assert xs("R1=7\nTRANS X=R1\nX0\nATRANS X=R1+1\nX=IC(1)\nX0") == [7.0, 8.0, 15.0]
-
-
-def test_jumps_lead_to_the_nearest_label():
-    text = (
-        "R1=0\nAGAIN: R1=R1+1\nX=R1\nIF R1<3 GOTOB AGAIN\nGOTOF OUT\nX99\nOUT: X50\nGOTOF OUT\nX99\nOUT: X51"
-    )
-    assert xs(text) == [1.0, 2.0, 3.0, 50.0, 51.0]
-
-
-def test_goto_looks_forwards_first_and_a_block_number_is_a_label():
-    text = (
-        "R1=0\nN10 R1=R1+1\nX=R1\nIF R1==1 GOTO N10\nIF R1==2 GOTO N20\nX99\n"
-        "N20 X7\nN30 IF R1>5 GOTOF N40\nX8\nN40"
-    )
-    assert xs(text) == [1.0, 2.0, 7.0, 8.0]
-
-
-def test_a_jump_leads_back_to_plain_blocks_before_the_first_calculation():
-    assert xs("BEGIN_1: G91 X1\nG90\nR9=R9+1\nIF R9<2 GOTOB BEGIN_1") == [1.0, 2.0]
+@named(
+    ("lines", "expected"),
+    {
+        "a frame shifted by a parameter": ("R1=7\nTRANS X=R1\nX0\nATRANS X=R1+1\nX=IC(1)\nX0", [7, 8, 15]),
+        "jumps to the nearest label": (
+            "R1=0\nAGAIN: R1=R1+1\nX=R1\nIF R1<3 GOTOB AGAIN\nGOTOF OUT\nX99\n"
+            "OUT: X50\nGOTOF OUT\nX99\nOUT: X51",
+            [1, 2, 3, 50, 51],
+        ),
+        "goto looks forwards first, a block number is a label": (
+            "R1=0\nN10 R1=R1+1\nX=R1\nIF R1==1 GOTO N10\nIF R1==2 GOTO N20\nX99\n"
+            "N20 X7\nN30 IF R1>5 GOTOF N40\nX8\nN40",
+            [1, 2, 7, 8],
+        ),
+        "back to plain blocks before the first calculation": (
+            "BEGIN_1: G91 X1\nG90\nR9=R9+1\nIF R9<2 GOTOB BEGIN_1",
+            [1, 2],
+        ),
+    },
+)
+def test_where_a_program_leads(lines, expected):
+    assert xs(lines) == expected
 
 
 def test_skipped_blocks_are_left_out():
@@ -104,7 +84,7 @@ def test_other_statements_of_the_control_stay_as_they_are():
 
 def test_a_parameter_that_nothing_has_set_is_told():
     (issue,) = (i for i in read("X=R7").issues if i.code == "parameter-unset")
-    assert issue.line == FIRST
+    assert issue.line == 4
     assert issue.message.startswith("R7 ")
 
 
@@ -141,18 +121,4 @@ def test_a_parameter_that_nothing_has_set_is_told():
     ],
 )
 def test_what_is_refused(text, found):
-    assert refused(text) == found
-
-
-def test_little_room_changes_nothing(monkeypatch):
-    from gcode2krl.gcode import read as module
-    from gcode2krl.gcode import text as text_of_files
-
-    text = "R1=0\nAB: R1=R1+1\nG0 X0 Y0\nG2 X1 Y0 I0.5 F500 M8\nG1 X=R1 M3\nIF R1<9 GOTOB AB"
-    expected = read(text)
-    monkeypatch.setattr(module, "_FIRST_ROWS", 1)
-    monkeypatch.setattr(module, "_FIRST_EVENTS", 0)
-    monkeypatch.setattr(text_of_files, "_PIECE_BYTES", 20)
-    found = read(text)
-    assert found.position_mm.tolist() == expected.position_mm.tolist()
-    assert found.events == expected.events
+    assert SINUMERIK.refused(text) == found

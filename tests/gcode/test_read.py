@@ -1,6 +1,5 @@
 """Reading: conventions beyond what LinuxCNC's interpreter prints, memory, tools, events."""
 
-import io
 import threading
 
 import numpy as np
@@ -9,12 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcode2krl import Gcode2KrlError, read_gcode
-from gcode2krl.gcode import read_stream
+from gcode2krl.cell import resolve_cell
 from gcode2krl.gcode import text as text_of_files
-
-
-def read(text, cell=None, **options):
-    return read_stream(io.BytesIO(text.encode("latin-1")), "part.nc", cell, **options)
+from tests.gcode import errors, named, read
 
 
 def test_row_0_is_the_start_and_axes_not_programmed_stay():
@@ -32,15 +28,24 @@ def test_an_arc_of_more_than_a_million_chords_is_a_mistake(radius):
     assert [(issue.code, issue.line) for issue in caught.value.issues] == [("too-far", 2)]
 
 
-def test_incremental_moves_do_not_make_an_axis_known():
-    toolpath = read("G21 G91 G0 X5\nG90 X1\nG91 X1\nM2\n")
-    np.testing.assert_array_equal(toolpath.known[:, 0], [0, 0, 1, 1])
+@named(
+    ("lines", "axis", "known"),
+    {
+        "incremental moves make none known": ("G21 G91 G0 X5\nG90 X1\nG91 X1", 0, [0, 0, 1, 1]),
+        "machine moves make it unknown": (
+            "G21 G0 X1 Y2 Z3\nG28 G91 Z0\nG90 G0 X4\nZ5",
+            2,
+            [0, 1, 1, 0, 0, 1],
+        ),
+    },
+)
+def test_what_is_known_of_an_axis(lines, axis, known):
+    np.testing.assert_array_equal(read(f"{lines}\nM2\n").known[:, axis], known)
 
 
-def test_machine_moves_make_axes_unknown():
+def test_machine_moves_are_marked():
     toolpath = read("G21 G0 X1 Y2 Z3\nG28 G91 Z0\nG90 G0 X4\nZ5\nM2\n")
     np.testing.assert_array_equal(toolpath.machine, [0, 0, 1, 1, 0, 0])
-    np.testing.assert_array_equal(toolpath.known[:, 2], [0, 1, 1, 0, 0, 1])
 
 
 def test_a_change_of_length_offset_makes_z_unknown(cell):
@@ -132,56 +137,43 @@ def test_a_large_arc_grows_the_rows():
     np.testing.assert_array_equal(toolpath.position_mm[-1], [0, 0, 0])
 
 
-def test_block_delete():
-    text = "G21 G0 X1\n/X2\nX3\nM2\n"
-    np.testing.assert_array_equal(read(text).position_mm[:, 0], [0, 1, 2, 3])
-    np.testing.assert_array_equal(read(text, block_delete=True).position_mm[:, 0], [0, 1, 3])
-
-
-def test_work_offsets_of_the_cell(tmp_path):
-    from gcode2krl import load_cell
-
-    path = tmp_path / "cell.toml"
-    path.write_text(
-        "[work_offsets.G55]\nx_mm = 100\ny_mm = 0\nz_mm = -5\na_deg = 0\nb_deg = 0\nc_deg = 0\n",
-        encoding="ascii",
-    )
-    toolpath = read("G21 G55 G0 X1 Y1 Z1\nG56 X1\nM2\n", load_cell(path))
+def test_work_offsets_of_the_cell():
+    zero = dict.fromkeys(("y_mm", "a_deg", "b_deg", "c_deg"), 0.0)
+    cell = resolve_cell({"work_offsets": {"G55": {"x_mm": 100.0, "z_mm": -5.0, **zero}}})
+    toolpath = read("G21 G55 G0 X1 Y1 Z1\nG56 X1\nM2\n", cell)
     np.testing.assert_allclose(toolpath.position_mm[1:], [[101, 1, -4], [1, 1, -4]])
     assert [(issue.code, issue.line) for issue in toolpath.issues] == [("work-offset-unknown", 2)]
 
 
-def test_findings_of_a_whole_program():
-    codes = [issue.code for issue in read("G0 X1.2345 Y2 Z3\n").issues]
-    assert codes == ["no-program-end", "unit-doubtful"]
-    assert [issue.code for issue in read("G0 X100\nM2\nG1 X5\n").issues] == ["after-end", "unit-unnamed"]
-    assert [issue.code for issue in read("(part in INCHES)\nG21 G0 X100\nM2\n").issues] == ["unit-doubtful"]
+@pytest.mark.parametrize(
+    ("text", "codes"),
+    [
+        ("G0 X1.2345 Y2 Z3\n", ["no-program-end", "unit-doubtful"]),
+        ("G0 X100\nM2\nG1 X5\n", ["after-end", "unit-unnamed"]),
+        ("(part in INCHES)\nG21 G0 X100\nM2\n", ["unit-doubtful"]),
+    ],
+)
+def test_findings_of_a_whole_program(text, codes):
+    assert [issue.code for issue in read(text).issues] == codes
 
 
 def test_all_errors_come_together_with_their_lines():
-    with pytest.raises(Gcode2KrlError) as caught:
-        read("G21\nG77\nG0 X\nG1 X1\nG0 X1 Q5\nM2\n")
-    assert [issue.line for issue in caught.value.issues] == [2, 3, 4, 5]
-    assert all(issue.remedy for issue in caught.value.issues)
+    found = errors("G21\nG77\nG0 X\nG1 X1\nG0 X1 Q5\nM2\n")
+    assert [issue.line for issue in found] == [2, 3, 4, 5]
+    assert all(issue.remedy for issue in found)
 
 
 def test_warnings_never_crowd_out_an_error():
-    with pytest.raises(Gcode2KrlError, match="G77"):
-        read("G21\n" + "G55\nG54\n" * 2000 + "G77\n")
+    assert "G77" in errors("G21\n" + "G55\nG54\n" * 2000 + "G77\n")[0].message
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet="GXYZFIJRMTSHNPO0123456789.-+ ()%/;#[]=\n\r\tßA", max_size=200))
 def test_any_text_gives_a_table_or_findings(text):
-    try:
-        toolpath = read_stream(io.BytesIO(text.encode("utf-8")), "part.nc")
-    except Gcode2KrlError as error:
-        messages = [issue.message for issue in error.issues]
+    if found := errors(text):
+        assert all(issue.message for issue in found)
     else:
-        messages = ["fine"]
-        assert np.isfinite(toolpath.position_mm).all()
-    assert messages
-    assert all(messages)
+        assert np.isfinite(read(text).position_mm).all()
 
 
 def test_a_folder_is_not_a_part(tmp_path):
@@ -201,27 +193,22 @@ def test_a_tool_table_in_mm(tmp_path):
 
 def test_a_refused_program_leaves_no_thread_behind():
     before = threading.active_count()
-    kept = []
-    for _ in range(3):
-        with pytest.raises(Gcode2KrlError) as caught:
-            read_stream(io.BytesIO(b"BEGIN PGM PART MM\nL X+10 R0 FMAX\n"), "part.h")
-        kept.append(caught)
+    kept = [errors("BEGIN PGM PART MM\nL X+10 R0 FMAX\n") for _ in range(3)]
+    assert all(kept)
     assert threading.active_count() == before
 
 
 @pytest.mark.parametrize(
-    "arc", ["G2 X0.001 Y-7.5 I-0.001 J0", "G3 X0.002 Y-7.5 R0.0008", "G2 X0.001 Y-7.5 Z3 I-0.001"]
+    ("arc", "is_flat"),
+    [
+        ("G2 X0.001 Y-7.5 I-0.001 J0", True),
+        ("G3 X0.002 Y-7.5 R0.0008", True),
+        ("G2 X0.001 Y-7.5 Z3 I-0.001", True),
+        ("G2 X0.001 Y-7.5 I-0.002", False),
+    ],
 )
-def test_an_arc_below_the_chord_tolerance_is_a_straight_move_with_a_note(arc):
-    text = f"G21 G90\nG0 X0.001 Y-7.5 Z5\n{arc} F600\nG1 X20\nM2\n"
-    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
-    assert [i.code for i in toolpath.issues] == ["arc-small"]
-    assert len(toolpath) == 4
-    assert toolpath.position_mm[2, 2] == (3.0 if "Z3" in arc else 5.0)
-    assert toolpath.arc[2] == -1
-
-
-def test_a_larger_arc_is_never_flattened():
-    text = "G21 G90\nG0 X0.002 Y0 Z5\nG2 X0.002 Y0 I-0.002 F600\nM2\n"
-    toolpath = read_stream(io.BytesIO(text.encode()), "part.nc")
-    assert not [i for i in toolpath.issues if i.code == "arc-small"]
+def test_an_arc_below_the_chord_tolerance_is_a_straight_move_with_a_note(arc, is_flat):
+    toolpath = read(f"G21 G90\nG0 X0.001 Y-7.5 Z5\n{arc} F600\nG1 X20\nM2\n")
+    assert [i.code for i in toolpath.issues] == ["arc-small"] * is_flat
+    assert (toolpath.arc[2] == -1) == is_flat
+    assert not is_flat or (len(toolpath), toolpath.position_mm[2, 2]) == (4, 3.0 if "Z3" in arc else 5.0)

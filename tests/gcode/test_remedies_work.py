@@ -1,6 +1,5 @@
 """The remedies of the reader's findings work when they are followed literally."""
 
-import io
 import tomllib
 from pathlib import Path
 
@@ -9,16 +8,16 @@ import pytest
 from gcode2krl import Gcode2KrlError
 from gcode2krl.gcode.dialects import REASONS
 from gcode2krl.gcode.findings import all_findings
-from gcode2krl.gcode.read import read_stream
 from tests.cells import over_demonstration
+from tests.gcode import Control, read, refusal
 
 HEAD, END = "G21\nG0 X0 Y0 Z5\n", "G0 X1\nM2\n"
 
 
 def errors(text):
-    """Return the errors of a program, as found."""
+    """Return the findings for which a program is refused, but its warnings."""
     try:
-        read_stream(io.BytesIO(text.encode()), "part.nc")
+        read(text)
     except Gcode2KrlError as error:
         return [issue for issue in error.issues if issue.severity != "warning"]
     return []
@@ -46,13 +45,11 @@ def test_the_remedy_names_what_helps_and_it_helps(line, remedy, mended):
 
 
 def test_the_caret_stands_before_the_inner_comment():
-    (found,) = errors(f"{HEAD}(ok) (hole at (0, 0) )\n{END}")
-    assert "(hole at ^(0, 0) )" in found.excerpt
+    assert "(hole at ^(0, 0) )" in refusal(f"{HEAD}(ok) (hole at (0, 0) )\n{END}").excerpt
 
 
 def test_a_code_that_stands_twice_is_not_said_to_exclude_itself():
-    (found,) = errors(f"{HEAD}G1 G1 X5 F100\n{END}")
-    assert "G1 stands twice" in found.message
+    assert "G1 stands twice" in refusal(f"{HEAD}G1 G1 X5 F100\n{END}").message
 
 
 def test_lines_that_end_in_cr_alone_are_one_finding_that_says_so():
@@ -100,11 +97,9 @@ def outcome(entry, lines, cell):
     """Return the findings of some lines behind a head, and the last place (none if refused)."""
     dialect = entry.get("dialect", "linuxcnc")
     head = "G21 G90 G17\n" if entry.get("whole") else BEFORE[dialect]
-    text = f"{head}{lines}\n{'99 END PGM P MM' if dialect == 'heidenhain' else 'M30'}\n"
+    control = Control(head, "99 END PGM P MM" if dialect == "heidenhain" else "M30", dialect)
     try:
-        toolpath = read_stream(
-            io.BytesIO(text.encode()), "part.nc", over_demonstration(cell), dialect=dialect
-        )
+        toolpath = control.read(lines, over_demonstration(cell))
     except Gcode2KrlError as error:
         return error.issues, None
     return [i for i in toolpath.issues if i.severity != "note"], toolpath.position_mm[-1].tolist()

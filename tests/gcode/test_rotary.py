@@ -1,7 +1,5 @@
 """Rotary words against homogeneous matrices (scipy), which share nothing with the reader."""
 
-import io
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from gcode2krl import Gcode2KrlError, load_cell
 from gcode2krl.cell.sections import Machine
-from gcode2krl.gcode import read_stream
+from tests.gcode import errors, named
+from tests.gcode import read as parsed
 
 CENTRE_MM, PIVOT_MM, TOOL_MM = (12.0, -7.0, -90.0), 160.0, 100.0
 KINDS = {
@@ -29,8 +28,7 @@ def machine(kind, *, tcpm, axes=None, signs=None, **keys):
 
 
 def read(text, made_for, **options):
-    cell = load_cell().model_copy(update={"machine": made_for})
-    return read_stream(io.BytesIO(text.encode()), "five axes", cell, **options)
+    return parsed(text, load_cell().model_copy(update={"machine": made_for}), **options)
 
 
 def matrix(rotation, shift=(0.0, 0.0, 0.0)):
@@ -83,35 +81,43 @@ def ends(toolpath):
 # --- positions by hand ------------------------------------------------------------------------------------
 
 
-def test_trunnion_by_hand():
-    """A90 turns the part right-handed about X, so the tool comes from +Y of the part."""
-    made_for = machine("table-table", tcpm=False, signs=(1, 1), centre_mm=(0.0, 0.0, -100.0))
-    toolpath = read(HEAD + "G0 X10 Y20 Z30 A90 C0\nM2\n", made_for)
-    np.testing.assert_allclose(toolpath.position_mm[-1], [10.0, 130.0, -120.0], atol=1e-9)
-    np.testing.assert_allclose(toolpath.axis[-1], [0.0, 1.0, 0.0], atol=1e-12)
+TRUNNION = {"kind": "table-table", "tcpm": False, "centre_mm": (0.0, 0.0, -100.0)}
+FORK = {"kind": "head-head", "axes": ("C", "B"), "signs": (1, 1)}
 
 
-def test_trunnion_with_negative_sign_by_hand():
-    made_for = machine("table-table", tcpm=False, signs=(-1, 1), centre_mm=(0.0, 0.0, -100.0))
-    toolpath = read(HEAD + "G0 X10 Y20 Z30 A90 C0\nM2\n", made_for)
-    np.testing.assert_allclose(toolpath.position_mm[-1], [10.0, -130.0, -80.0], atol=1e-9)
-    np.testing.assert_allclose(toolpath.axis[-1], [0.0, -1.0, 0.0], atol=1e-12)
-
-
-def test_head_by_hand():
-    """B90 lays the tool along +X: its tip is 260 mm (pivot and tool) up and back from where it hung."""
-    made_for = machine("head-head", tcpm=False, axes=("C", "B"), signs=(1, 1))
-    toolpath = read(HEAD + "G0 X0 Y0 Z0 B90 C0\nM2\n", made_for)
-    np.testing.assert_allclose(toolpath.position_mm[-1], [-260.0, 0.0, 260.0], atol=1e-9)
-    np.testing.assert_allclose(toolpath.axis[-1], [1.0, 0.0, 0.0], atol=1e-12)
-
-
-def test_tip_programmed_is_the_tip():
-    """The first axis carries the second: C90 turns the direction of B."""
-    made_for = machine("head-head", tcpm=True, axes=("C", "B"), signs=(1, 1))
-    toolpath = read(HEAD + "G0 X1 Y2 Z3 B30 C90\nM2\n", made_for)
-    np.testing.assert_allclose(toolpath.position_mm[-1], [1.0, 2.0, 3.0], atol=1e-12)
-    np.testing.assert_allclose(toolpath.axis[-1], [0.0, 0.5, np.sqrt(0.75)], atol=1e-12)
+@named(
+    ("keys", "words", "tip_mm", "axis"),
+    {
+        "A90 turns the part right-handed about X: the tool comes from its +Y": (
+            TRUNNION | {"signs": (1, 1)},
+            "X10 Y20 Z30 A90 C0",
+            [10, 130, -120],
+            [0, 1, 0],
+        ),
+        "the other sign": (
+            TRUNNION | {"signs": (-1, 1)},
+            "X10 Y20 Z30 A90 C0",
+            [10, -130, -80],
+            [0, -1, 0],
+        ),
+        "B90 lays the tool along +X: its tip is 260 mm (pivot and tool) up and back": (
+            FORK | {"tcpm": False},
+            "X0 Y0 Z0 B90 C0",
+            [-260, 0, 260],
+            [1, 0, 0],
+        ),
+        "the first axis carries the second: C90 turns the direction of B": (
+            FORK | {"tcpm": True},
+            "X1 Y2 Z3 B30 C90",
+            [1, 2, 3],
+            [0, 0.5, np.sqrt(0.75)],
+        ),
+    },
+)
+def test_places_by_hand(keys, words, tip_mm, axis):
+    toolpath = read(f"{HEAD}G0 {words}\nM2\n", machine(**keys))
+    np.testing.assert_allclose(toolpath.position_mm[-1], tip_mm, atol=1e-9)
+    np.testing.assert_allclose(toolpath.axis[-1], axis, atol=1e-12)
 
 
 # --- against matrices -------------------------------------------------------------------------------------
@@ -296,17 +302,19 @@ def test_feeds_of_the_tip():
     np.testing.assert_allclose(toolpath.feed_mm_s[toolpath.source_line == 8], 40.0 / 12.0)
 
 
-@pytest.mark.parametrize(("block", "rate"), [("G1 A30 F600", "10"), ("G93\nG1 A30 F4", "2")])
-def test_a_slow_turn_on_the_spot_is_refused_with_its_speed(block, rate):
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("G1 A30 F600", ["at 10 deg/s"]),
+        ("G93\nG1 A30 F4", ["at 2 deg/s"]),
+        ("G1 A30 F60000", []),
+    ],
+)
+def test_a_slow_turn_on_the_spot_is_refused_with_its_speed(block, said):
     toolpath = read(HEAD + f"G0 X0 Y0 Z0\nG1 X5 F500\n{block}\nM2\n", machine("head-head", tcpm=True))
-    found = [issue for issue in toolpath.issues if issue.code == "turn-speed"]
-    assert len(found) == 1
-    assert f"at {rate} deg/s" in found[0].message
-
-
-def test_a_quick_turn_on_the_spot_is_none():
-    toolpath = read(HEAD + "G0 X0 Y0 Z0\nG1 X5 F500\nG1 A30 F60000\nM2\n", machine("head-head", tcpm=True))
-    assert not any(issue.code == "turn-speed" for issue in toolpath.issues)
+    found = [issue.message for issue in toolpath.issues if issue.code == "turn-speed"]
+    assert len(found) == len(said)
+    assert all(words in message for words, message in zip(said, found, strict=True))
 
 
 # --- G43.4 and G43.5 --------------------------------------------------------------------------------------
@@ -365,11 +373,11 @@ REFUSED = {  # block: code, empty for any; kind of machine, None without one
 @pytest.mark.parametrize("block", REFUSED)
 def test_refused(block):
     code, kind = REFUSED[block]
-    made_for = machine(kind, tcpm=False) if kind else None
-    with pytest.raises(Gcode2KrlError) as caught:
-        read(HEAD + "G0 X0 Y0 Z0\n" + block + "\nM2\n", made_for)
-    assert not code or code in [issue.code for issue in caught.value.issues]
-    assert all(issue.remedy for issue in caught.value.issues if issue.severity == "error")
+    cell = load_cell().model_copy(update={"machine": machine(kind, tcpm=False) if kind else None})
+    found = errors(HEAD + "G0 X0 Y0 Z0\n" + block + "\nM2\n", cell)
+    assert found
+    assert not code or code in [issue.code for issue in found]
+    assert all(issue.remedy for issue in found)
 
 
 @pytest.mark.parametrize(("kind", "key"), [("head-head", "pivot_mm"), ("table-table", "centre_mm")])

@@ -24,11 +24,11 @@ def places(folder, lines, **subprograms):
     return read_gcode(main, dialect="sinumerik").position_mm[2:].tolist()
 
 
-def refusals(folder, lines, **subprograms):
+def refusal(folder, lines, **subprograms):
     main = write(folder, lines, **subprograms)
     with pytest.raises(Gcode2KrlError) as refused:
         read_gcode(main, dialect="sinumerik")
-    return [issue for issue in refused.value.issues if issue.severity == "error"]
+    return next(issue for issue in refused.value.issues if issue.severity == "error")
 
 
 SLOT = "; a slot\nPROC SLOT(REAL LENGTH, INT TIMES, BOOL BACK)\nX=LENGTH Y=TIMES\nIF BACK\nX0\nENDIF\nRET"
@@ -114,37 +114,50 @@ def test_a_call_that_is_not_sure_is_refused(tmp_path, lines, sub, code, says):
     if not code:
         assert places(tmp_path, lines, SUB=sub)
         return
-    first = refusals(tmp_path, lines, SUB=sub)[0]
+    first = refusal(tmp_path, lines, SUB=sub)
     assert first.code == code
     assert says in f"{first.message} {first.remedy}"
     assert "line" not in first.message or first.line == 0 or first.line == 4
 
 
 def test_an_error_in_a_subprogram_names_its_file_and_line(tmp_path):
-    found = refusals(tmp_path, "SUB", SUB="X1\nX=1/0\nRET")
-    assert found[0].file_line == 2
-    assert "SUB.SPF" in found[0].message
+    found = refusal(tmp_path, "SUB", SUB="X1\nX=1/0\nRET")
+    assert found.file_line == 2
+    assert "SUB.SPF" in found.message
 
 
-@pytest.mark.parametrize(("value", "x"), [("1", 10), ("2", 20), ("2+5", 30), ("-1", 40)])
-def test_case_leads_to_the_label_of_its_value(tmp_path, value, x):
-    lines = (
-        f"R1={value}\nCASE R1 OF 1 GOTOF ONE 2 GOTOF TWO -1 GOTOF LESS DEFAULT GOTOF OTHER\n"
-        "ONE: X10\nGOTOF LAST\nTWO: X20\nGOTOF LAST\nOTHER: X30\nGOTOF LAST\nLESS: X40\nLAST: Y1"
-    )
-    assert places(tmp_path, lines) == [[x, 0, 5], [x, 1, 5]]
+CASE = (
+    "CASE {} OF 1 GOTOF ONE 2 GOTOF TWO -1 GOTOF LESS DEFAULT GOTOF OTHER\n"
+    "ONE: X10\nGOTOF LAST\nTWO: X20\nGOTOF LAST\nOTHER: X30\nGOTOF LAST\nLESS: X40\nLAST: Y1"
+)
 
 
-def test_case_without_default_and_gotoc_without_a_label_go_on(tmp_path):
-    assert places(tmp_path, "CASE (R1+3) OF 1 GOTOF ONE\nX5\nONE: Y5") == [[5, 0, 5], [5, 5, 5]]
-    assert places(tmp_path, "GOTOC NOWHERE\nX5\nGOTOC LAST\nX6\nLAST: Y5") == [[5, 0, 5], [5, 5, 5]]
-    for line in (
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        ("R1=1\n" + CASE.format("R1"), [[10, 0, 5], [10, 1, 5]]),
+        ("R1=2\n" + CASE.format("R1"), [[20, 0, 5], [20, 1, 5]]),
+        ("R1=2+5\n" + CASE.format("R1"), [[30, 0, 5], [30, 1, 5]]),
+        ("R1=-1\n" + CASE.format("R1"), [[40, 0, 5], [40, 1, 5]]),
+        ("CASE (R1+3) OF 1 GOTOF ONE\nX5\nONE: Y5", [[5, 0, 5], [5, 5, 5]]),
+        ("GOTOC NOWHERE\nX5\nGOTOC LAST\nX6\nLAST: Y5", [[5, 0, 5], [5, 5, 5]]),
+    ],
+)
+def test_case_leads_to_the_label_of_its_value(tmp_path, lines, expected):
+    assert places(tmp_path, lines) == expected
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
         "CASE 1.5 OF 1 GOTOF ONE",
         "CASE 1 OF ONE",
         "CASE 1 OF 1 GOTOF ONE X3",
         "CASE 1 OF 1 GOTOF TWO",
-    ):
-        assert refusals(tmp_path, f"{line}\nONE: X1")[0].code == "o-word", line
+    ],
+)
+def test_a_case_that_leads_nowhere_sure_is_refused(tmp_path, line):
+    assert refusal(tmp_path, f"{line}\nONE: X1").code == "o-word"
 
 
 def test_the_steps_of_a_subprogram_that_drills(tmp_path):

@@ -1,23 +1,23 @@
 """Diameters and changes that CAM comments name, against the cell's tools."""
 
-import io
-
 import pytest
 
-from gcode2krl.gcode import read_stream, tool_comments
+from gcode2krl.gcode import tool_comments
 from gcode2krl.gcode.tool_comments import named_tools
 from tests.cells import over_demonstration
+from tests.gcode import read
 
 CELL = over_demonstration()  # T1 is 16 mm wide, T6 10 mm
 BODY = "G21 G90 G17\nT{tool} M6\nS9000 M3\nG0 G43 H{tool} Z30\nG0 X0 Y0\nG1 Z-5 F600\nG0 Z30\nM5\nM30\n"
 
 
+def differing(text, cell=CELL, **options):
+    return [issue for issue in read(text, cell, **options).issues if issue.code == "tool-differs"]
+
+
 def warned(comment, tool=1, more=""):
-    text = f"%\n{comment}\n" + BODY.format(tool=tool) + more
-    issues = read_stream(
-        io.BytesIO(text.replace("M30\n" + more, more + "M30\n%\n").encode()), "part.nc", CELL
-    ).issues
-    return [(issue.severity, issue.line) for issue in issues if issue.code == "tool-differs"]
+    body = BODY.format(tool=tool).replace("M30\n", more + "M30\n%\n")
+    return [(issue.severity, issue.line) for issue in differing(f"%\n{comment}\n{body}")]
 
 
 OTHERS = [
@@ -52,19 +52,16 @@ SAME_OR_SILENT = [
 ]
 
 
-@pytest.mark.parametrize("comment", OTHERS)
-def test_another_diameter_is_a_warning_with_the_comments_line(comment):
-    assert warned(comment) == [("warning", 2)]
+@pytest.mark.parametrize(
+    ("comment", "expected"), [*((c, [("warning", 2)]) for c in OTHERS), *((c, []) for c in SAME_OR_SILENT)]
+)
+def test_another_diameter_is_a_warning_with_the_comments_line(comment, expected):
+    assert warned(comment) == expected
 
 
-@pytest.mark.parametrize("comment", SAME_OR_SILENT)
-def test_the_same_or_none_is_silent(comment):
-    assert warned(comment) == []
-
-
-def test_the_tool_that_the_comment_names_is_compared():
-    assert warned("(T6 D=10. CR=0. - flat end mill)", tool=6) == []
-    assert warned("(T6 D=12. CR=0. - flat end mill)", tool=6) == [("warning", 2)]
+@pytest.mark.parametrize(("diameter_mm", "expected"), [(10, []), (12, [("warning", 2)])])
+def test_the_tool_that_the_comment_names_is_compared(diameter_mm, expected):
+    assert warned(f"(T6 D={diameter_mm}. CR=0. - flat end mill)", tool=6) == expected
 
 
 def test_a_comment_without_a_number_says_nothing_where_there_are_two_tools():
@@ -74,9 +71,7 @@ def test_a_comment_without_a_number_says_nothing_where_there_are_two_tools():
 
 
 def test_the_message_tells_both_and_each_tool_once():
-    text = "(T1 D=10. - flat end mill)\n" * 3 + BODY.format(tool=1)
-    issues = read_stream(io.BytesIO(text.encode()), "part.nc", CELL).issues
-    (issue,) = [issue for issue in issues if issue.code == "tool-differs"]
+    (issue,) = differing("(T1 D=10. - flat end mill)\n" * 3 + BODY.format(tool=1))
     assert "diameter of 10," in issue.message
     assert "16 mm" in issue.message
     assert "tool.1.diameter_mm" in issue.remedy
@@ -85,8 +80,7 @@ def test_the_message_tells_both_and_each_tool_once():
 def test_lines_are_right_far_into_a_long_file():
     filler = "G1 X1.234 Y5.678 Z-0.123 F600 (a)\n" * 60_000  # several pieces
     text = BODY.format(tool=1).replace("M5\n", filler + "(T1 D=10.)\nM5\n")
-    issues = read_stream(io.BytesIO(text.encode()), "part.nc", CELL).issues
-    assert [issue.line for issue in issues if issue.code == "tool-differs"] == [7 + 60_000 + 1]
+    assert [issue.line for issue in differing(text)] == [7 + 60_000 + 1]
 
 
 @pytest.mark.parametrize(
@@ -102,8 +96,7 @@ GRBL = "G17 G90 G21\n{first}\nM3 S10000\nG54\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F200\n{sec
 
 def changes_told(first, second, mounted):
     cell = CELL.model_copy(update={"mounted_tool": mounted})
-    text = GRBL.format(first=first, second=second)
-    issues = read_stream(io.BytesIO(text.encode()), "part.nc", cell, dialect="grbl").issues
+    issues = read(GRBL.format(first=first, second=second), cell, dialect="grbl").issues
     return [(i.line, i.remedy) for i in issues if i.code == "tool-not-changed"]
 
 
@@ -131,13 +124,8 @@ def test_a_diameter_behind_a_change_in_a_comment_is_that_tools():
     assert [(s.tool, s.value, s.is_change) for s in said] == [(2, 0.0, True), (2, 4.0, False)]
 
 
-def test_the_mounted_tool_is_the_one_of_h_until_a_change():
-    text = "G21 G90\nT1\nG0 X0 Y0\nG43 Z9 H{h}\nM2\n"
-    cell = CELL.model_copy(update={"mounted_tool": 1})
-
-    def codes(h, of_cell):
-        return {i.code for i in read_stream(io.BytesIO(text.format(h=h).encode()), "part.nc", of_cell).issues}
-
-    assert "h-differs" not in codes(1, cell)
-    assert "h-differs" in codes(6, cell)
-    assert "h-differs" in codes(1, CELL.model_copy(update={"mounted_tool": 6}))
+@pytest.mark.parametrize(("h", "mounted", "differs"), [(1, 1, False), (6, 1, True), (1, 6, True)])
+def test_the_mounted_tool_is_the_one_of_h_until_a_change(h, mounted, differs):
+    cell = CELL.model_copy(update={"mounted_tool": mounted})
+    issues = read(f"G21 G90\nT1\nG0 X0 Y0\nG43 Z9 H{h}\nM2\n", cell).issues
+    assert ("h-differs" in {issue.code for issue in issues}) == differs

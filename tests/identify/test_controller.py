@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gcode2krl import set_targets
-from gcode2krl.cli.main import _run
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.gcode import read_stream
 from gcode2krl.identify import controller as identify
@@ -89,13 +88,11 @@ def test_turning_lines_that_never_reach_their_speed_leave_it_open(text, cell):
 
 @pytest.mark.slow
 def test_the_krl_form_has_the_turning_lines_and_its_trace_is_read(run, text, cell, tmp_path):
-    made = run("make-test", "controller", "-o", "test.src", "--json")
-    assert made.code == 0, made.err
+    run("make-test", "controller", "-o", "test.src", "--json", code=0)
     source = Path("test.src").read_text("ascii")
     assert all(f"B -{angle:.4f}" in source for _, angle in TURNS)
     write_csv(turning_trace(text, cell, Controller(), 200.0, 100.0), Path("trace.csv"))
-    outcome = run("identify", "controller", "trace.csv", "--json")
-    record = json.loads(outcome.out)
+    record = json.loads(run("identify", "controller", "trace.csv", "--json").out)
     assert record["acc_ori_deg_s2"] == pytest.approx(100.0, rel=0.01)
 
 
@@ -103,10 +100,8 @@ def test_the_krl_form_has_the_turning_lines_and_its_trace_is_read(run, text, cel
 
 
 def test_program_translates_without_findings(run, tmp_path):
-    made = run("make-test", "controller", "-o", "test.nc")
-    assert made.code == 0, made.err
-    outcome = run("test.nc", "-o", "test.src", "--json", "--strict")
-    assert outcome.code == 0
+    run("make-test", "controller", "-o", "test.nc", code=0)
+    outcome = run("test.nc", "-o", "test.src", "--json", "--strict", code=0)
     codes = [issue["code"] for issue in json.loads(outcome.out)["issues"]]
     assert codes == ["cell-not-verified", "exact-stops", "corner-undecided", "stock-guessed"]  # on purpose
     assert "$APO.CDIS=5.000" in (tmp_path / "test.src").read_text()
@@ -144,14 +139,13 @@ def test_program_elsewhere_and_slower(run, tmp_path):
     (tmp_path / "cell.toml").write_text(
         "based_on = 'demonstration'\n[controller]\nvel_cp_m_s = 0.1\n", encoding="utf-8"
     )
-    outcome = run("make-test", "controller", "-o", "-", "--cell", "cell.toml", "--at", "10", "20", "30")
-    assert outcome.code == 0
+    outcome = run(
+        "make-test", "controller", "-o", "-", "--cell", "cell.toml", "--at", "10", "20", "30", code=0
+    )
     assert "G0 X10.000 Y20.000" in outcome.out
     assert "Z30.000" in outcome.out
     assert "F12000" not in outcome.out
-    above = run("make-test", "controller", "-o", "t.nc", "--at", "0", "0", "900")
-    assert above.code == 2
-    assert "clearance" in above.err
+    assert "clearance" in run("make-test", "controller", "-o", "t.nc", "--at", "0", "0", "900", code=2).err
 
 
 # --- recovery -------------------------------------------------------------------------------------------
@@ -274,9 +268,16 @@ def test_command(run, tmp_path, text):
         'name = "mine"\nbased_on = "demonstration"\n[controller]\nadvance = 4\n', encoding="utf-8"
     )
     outcome = run(
-        "identify", "controller", "trace.csv", "--json", "--plot", "figure.png", "--apply", "cell.toml"
+        "identify",
+        "controller",
+        "trace.csv",
+        "--json",
+        "--plot",
+        "figure.png",
+        "--apply",
+        "cell.toml",
+        code=0,
     )
-    assert outcome.code == 0, outcome.err
     result = json.loads(outcome.out)
     assert result["k_s"] == pytest.approx(0.156, abs=1e-4)
     assert result["k_interval_s"][0] < result["k_s"] < result["k_interval_s"][1]
@@ -304,15 +305,11 @@ def test_command_with_a_program_of_the_cells_cdis(run, tmp_path, text):
     )
     write_csv(trace_of(own, Controller(0.168, 5.0)), tmp_path / "trace.csv")
     arguments = ("--part", "own.nc", "--cell", "cell.toml", "--apply", "new.toml")
-    outcome = run("identify", "controller", "trace.csv", *arguments)
-    assert outcome.code == 0, outcome.err
-    assert "14 cycles of 12 ms" in outcome.out
+    assert "14 cycles of 12 ms" in run("identify", "controller", "trace.csv", *arguments, code=0).out
     cell = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
     assert cell["controller"]["cdis_mm"] == pytest.approx(5.0, abs=0.01)
 
 
 def test_command_without_a_trace(run):
-    outcome = run("identify", "controller", "none.csv")
-    assert outcome.code == 2
-    assert "none.csv: error" in outcome.err
-    assert _run(["identify", "controller", "none.csv", "--plot", "nowhere/figure.png"]) == 2
+    assert "none.csv: error" in run("identify", "controller", "none.csv", code=2).err
+    run("identify", "controller", "none.csv", "--plot", "nowhere/figure.png", code=2)

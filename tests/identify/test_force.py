@@ -161,8 +161,7 @@ def test_the_command_reads_a_run_and_writes_the_cell(run, tmp_path):
         'prediction = "../prediction"\n[frames]\nforce = "base"\n', encoding="utf-8"
     )
     (tmp_path / "found.toml").write_text(stock, encoding="utf-8")
-    outcome = run("identify", "force", "run", "--json", "--apply", "found.toml", "--plot", "fit.png")
-    assert outcome.code == 0, outcome.err
+    outcome = run("identify", "force", "run", "--json", "--apply", "found.toml", "--plot", "fit.png", code=0)
     found = json.loads(outcome.out)["coefficients"]
     for name, true in zip(NAMES, TRUE, strict=True):
         assert found[name]["value"] == pytest.approx(true, rel=0.03, abs=0.5)
@@ -171,10 +170,8 @@ def test_the_command_reads_a_run_and_writes_the_cell(run, tmp_path):
     low, high = written["material"]["measured_f_z_mm"]
     assert low == pytest.approx(1200 / 13000 / 3, rel=0.02)
     assert high == pytest.approx(4400 / 13000 / 3, rel=0.02)
-    again = run("predict", "slots.nc", "-o", "again", "--cell", "found.toml", "-q")
-    assert again.code == 0, again.err
+    again = run("predict", "slots.nc", "-o", "again", "--cell", "found.toml", "-q", code=0)
     assert "force-unmeasured" not in again.err
     (tmp_path / "fast.nc").write_text(SLOTS.replace("F4400", "F9000"), encoding="ascii")
-    fast = run("predict", "fast.nc", "-o", "fast", "--cell", "found.toml", "-q")
-    assert "force-unmeasured" in fast.err
+    assert "force-unmeasured" in run("predict", "fast.nc", "-o", "fast", "--cell", "found.toml", "-q").err
     assert run("identify", "force", "prediction").code == 2

@@ -383,9 +383,7 @@ def test_the_command_says_writes_and_draws(run, tmp_path):
     ],
 )
 def test_wrong_words_end_in_one_line(run, words):
-    done = run("identify", "kinematics", str(EXAMPLE), *words)
-    assert done.code == 2
-    assert len(done.err.strip().splitlines()) == 1
+    assert len(run("identify", "kinematics", str(EXAMPLE), *words, code=2).err.strip().splitlines()) == 1
 
 
 def test_no_cell_is_written_for_an_arm_of_another_maker(run, tmp_path):

@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from gcode2krl import load_cell
-from gcode2krl.cli.identify_stiffness import command
 from gcode2krl.compliance import assumed_stiffness, stiffness
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.identify.pulls import fit, form, propose, read_form
@@ -84,17 +82,15 @@ def test_a_form_without_readings_says_so(cell, tmp_path):
         read_form(file)
 
 
-def test_form_to_cell_by_the_command(done, tmp_path):
+def test_form_to_cell_by_the_command(run, done, tmp_path):
     """A form is written, a filled one fitted; then the arm is measured, and the spindle still asked for."""
     new, cell_file = tmp_path / "new.csv", tmp_path / "cell.toml"
     cell_file.write_text('[robot]\nmodel = "KR 300 R2500 ultra"\n', "utf-8")
-    run = CliRunner().invoke(command, ["--pulls", str(new), "--cell", str(cell_file)])
-    assert run.exit_code == 0, run.output
+    run("identify", "stiffness", "--pulls", new, "--cell", cell_file, code=0)
     assert len(new.read_text("utf-8").splitlines()) == 31
-    arguments = ["--pulls", str(done), "--cell", str(cell_file), "--apply", str(cell_file), "--json"]
-    run = CliRunner().invoke(command, arguments)
-    assert run.exit_code == 0, run.output
-    assert json.loads(run.stdout)["k_Nmm_rad"]["A2"]["value"] == pytest.approx(2e9, rel=0.15)
+    arguments = ("--pulls", done, "--cell", cell_file, "--apply", cell_file, "--json")
+    fitted = json.loads(run("identify", "stiffness", *arguments, code=0).out)
+    assert fitted["k_Nmm_rad"]["A2"]["value"] == pytest.approx(2e9, rel=0.15)
     cell = load_cell(cell_file)
     assert stiffness(cell).assumed == "sensor and spindle taken as rigid"
     assert assumed_stiffness(cell) is not None

@@ -9,8 +9,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gcode2krl.cli.console import Console
-from gcode2krl.cli.identify_sensor import command
 from gcode2krl.compliance.sensor import (
     Calibration,
     calibration_toml,
@@ -19,7 +17,7 @@ from gcode2krl.compliance.sensor import (
     read_calibration,
     transfer_to_tcp,
 )
-from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, RefusedError
+from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.identify.sensor import identify_sensor
 from gcode2krl.identify.sensor_poses import SensorPoses, read_poses
 from tests.identify.make_measurements import FOLDER, make, sensor_poses
@@ -302,15 +300,7 @@ def test_calibration_survives_its_file(tmp_path):
 # --- files and command ----------------------------------------------------------------------------------
 
 
-def run_sensor(capfd, *arguments):
-    capfd.readouterr()
-    try:
-        code = command.main([str(argument) for argument in arguments], standalone_mode=False)
-    except Gcode2KrlError as error:
-        Console().findings(error.issues, error.source)
-        code = error.exit_code
-    out, err = capfd.readouterr()
-    return code, out, err
+SENSOR = ("identify", "sensor")
 
 
 def test_orientation_as_angles_quaternions_and_joints(tmp_path, cell):
@@ -346,27 +336,25 @@ def test_wrong_files_are_told(tmp_path, cell):
             read_poses(file, cell)
 
 
-def test_command(capfd, tmp_path):
-    code, out, err = run_sensor(capfd, FOLDER / "orientations.csv", "-o", tmp_path / "sensor.toml")
-    assert code == 0
-    assert err.count("note: ") == 2
-    assert "27 orientations, 90% intervals" in out
+def test_command(run, tmp_path):
+    done = run(*SENSOR, FOLDER / "orientations.csv", "-o", tmp_path / "sensor.toml", code=0)
+    assert done.err.count("note: ") == 2
+    assert "27 orientations, 90% intervals" in done.out
     assert read_calibration(tmp_path / "sensor.toml").weight_N == pytest.approx(make.WEIGHT_N, rel=0.05)
-    code, out, err = run_sensor(capfd, FOLDER / "orientations.csv", "--json", "--noise-N", "20")
-    result = json.loads(out)
+    result = json.loads(run(*SENSOR, FOLDER / "orientations.csv", "--json", "--noise-N", "20").out)
     assert result["force_noise_N"] == 20.0
     assert result["weight_interval_N"][0] < make.WEIGHT_N < result["weight_interval_N"][1]
     assert set(result["calibration"]) == set(Calibration.model_fields)
 
 
-def test_command_refuses(capfd, tmp_path):
+def test_command_refuses(run, tmp_path):
     file = tmp_path / "same.csv"
     rows = make.pose_rows([(0, 90, 0)] * 4, np.random.default_rng(1))
     file.write_text(make.pose_csv(rows), encoding="utf-8")
-    code, _, err = run_sensor(capfd, file, "-o", tmp_path / "sensor.toml")
-    assert code == 1
-    assert "same.csv: error: not determined: weight, centre of gravity and offset" in err
+    assert (
+        "same.csv: error: not determined: weight, centre of gravity and offset"
+        in run(*SENSOR, file, "-o", tmp_path / "sensor.toml", code=1).err
+    )
     assert not (tmp_path / "sensor.toml").exists()
-    code, out, _ = run_sensor(capfd, file, "--json")
-    assert (code, json.loads(out)["issues"][0]["code"]) == (1, "not-determined")
-    assert run_sensor(capfd, file, "-o", file)[0] == 2
+    assert json.loads(run(*SENSOR, file, "--json", code=1).out)["issues"][0]["code"] == "not-determined"
+    run(*SENSOR, file, "-o", file, code=2)

@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 
 from gcode2krl import load_cell
 from gcode2krl.cell import resolve_cell
-from gcode2krl.cli.console import Console
-from gcode2krl.cli.identify_stiffness import command
 from gcode2krl.compliance import deflection
-from gcode2krl.errors import Gcode2KrlError, NotUnderstoodError, RefusedError
+from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.identify.arm_frames import joint_frames
 from gcode2krl.identify.cubes import Layout, distances, motion_covariance, motion_of
 from gcode2krl.identify.estimate import student
@@ -32,16 +30,7 @@ def rows():
     return clean_rows()
 
 
-def run_stiffness(capfd, *arguments):
-    """Run the command as the program does; returns exit code, output and findings."""
-    capfd.readouterr()
-    try:
-        code = command.main([str(argument) for argument in arguments], standalone_mode=False)
-    except Gcode2KrlError as error:
-        Console().findings(error.issues, error.source)
-        code = error.exit_code
-    out, err = capfd.readouterr()
-    return code, out, err
+STIFFNESS = ("identify", "stiffness")
 
 
 def write(folder, rows, name="m", **head):
@@ -469,16 +458,14 @@ def test_readings_named_in_the_head(rows, tmp_path):
 
 
 @pytest.mark.slow
-def test_command_prints_json_draws_and_applies(capfd, tmp_path):
+def test_command_prints_json_draws_and_applies(run, tmp_path):
     cell_file = tmp_path / "cell.toml"
     cell_file.write_text(
         'name = "mine"\nbased_on = "demonstration"\n[compliance]\nsensor_height_mm = 56.0\n', encoding="utf-8"
     )
     for _ in range(2):  # applying again changes nothing
-        code, out, err = run_stiffness(
-            capfd, FOLDER / "robot.toml", "--json", "--plot", tmp_path / "f.png", "--apply", cell_file
-        )
-        assert code == 0, err
+        options = ("--json", "--plot", tmp_path / "f.png", "--apply", cell_file)
+        out = run(*STIFFNESS, FOLDER / "robot.toml", *options, code=0).out
         first = cell_file.read_text(encoding="utf-8")
     result = json.loads(out)
     assert set(result["joints"]) == set(JOINTS)
@@ -500,37 +487,29 @@ def test_command_prints_json_draws_and_applies(capfd, tmp_path):
         in cell.compliance.source
     )
     for _ in range(2):
-        code, out, err = run_stiffness(
-            capfd, FOLDER / "holder.csv", "--apply", cell_file, "--cell", cell_file
-        )
-        assert (code, err) == (0, "")
-    assert "spindle     x k_c  1.8" in out
+        done = run(*STIFFNESS, FOLDER / "holder.csv", "--apply", cell_file, "--cell", cell_file, code=0)
+        assert done.err == ""
+    assert "spindle     x k_c  1.8" in done.out
     both = load_cell(cell_file).compliance
     assert both.source.count("identified from holder.csv") == 1
     assert both.virtual_joints["A1"] == cell.compliance.virtual_joints["A1"]
     assert first != cell_file.read_text(encoding="utf-8")
 
 
-def test_command_refuses_to_apply_what_is_not_determined(capfd, tmp_path, rows):
+def test_command_refuses_to_apply_what_is_not_determined(run, tmp_path, rows):
     head = write(tmp_path, [row for row in rows if row[0] != "A4"], noise_mm=0.0)
-    code, out, err = run_stiffness(
-        capfd, head, "--apply", tmp_path / "cell.toml", "--plot", tmp_path / "f.svg"
-    )
-    assert code == 1
-    assert err.count("error: k_") == 3
-    assert "k_a of A4: not determined: the file has no row of its pair of cubes" in err
-    assert "A4          x k_c  not determined" in out
+    done = run(*STIFFNESS, head, "--apply", tmp_path / "cell.toml", "--plot", tmp_path / "f.svg", code=1)
+    assert done.err.count("error: k_") == 3
+    assert "k_a of A4: not determined: the file has no row of its pair of cubes" in done.err
+    assert "A4          x k_c  not determined" in done.out
     assert not (tmp_path / "cell.toml").exists()
     assert (tmp_path / "f.svg").exists()
 
 
-def test_command_says_what_is_wrong(capfd, tmp_path, rows):
-    code, _, err = run_stiffness(capfd, tmp_path / "none.toml")
-    assert code == 2
-    assert "none.toml: error: cannot read" in err
-    code, out, _ = run_stiffness(capfd, tmp_path / "none.toml", "--json")
-    assert code == 2
-    assert json.loads(out)["issues"][0]["code"] == "file-unreadable"
+def test_command_says_what_is_wrong(run, tmp_path, rows):
+    assert "none.toml: error: cannot read" in run(*STIFFNESS, tmp_path / "none.toml", code=2).err
+    record = json.loads(run(*STIFFNESS, tmp_path / "none.toml", "--json", code=2).out)
+    assert record["issues"][0]["code"] == "file-unreadable"
     head = write(tmp_path, rows[:48])
-    assert run_stiffness(capfd, head, "--plot", tmp_path / "f.txt")[0] == 2
-    assert run_stiffness(capfd, head, "--apply", head)[0] == 2
+    run(*STIFFNESS, head, "--plot", tmp_path / "f.txt", code=2)
+    run(*STIFFNESS, head, "--apply", head, code=2)

@@ -8,6 +8,7 @@ import pytest
 
 from gcode2krl import set_targets, verify_krl, write_krl
 from gcode2krl.gcode import read_stream
+from gcode2krl.krl.verify import VerifyReport
 from tests.cells import over_demonstration
 
 PART = """G21 G90 G17 G40 G49 G80 G94
@@ -62,6 +63,13 @@ class Made:
         output = folder if into_folder else folder / f"{stem}.src"
         self.program = write_krl(self.targets, output, self.cell, **options)
         self.src = self.program.files[0]
+
+    @property
+    def text(self) -> str:
+        return self.src.read_bytes().decode("ascii")
+
+    def verified(self, **options) -> VerifyReport:
+        return verified(self.src, self.toolpath, self.cell, **options)
 
     @property
     def lines(self) -> list[str]:

@@ -153,6 +153,17 @@ def _executed(blocks: Mapping[str, list[tuple[int, str]]], name: str) -> Iterato
             yield number, text
 
 
+def opw_solver(lengths_mm, *, degrees: bool) -> opw.Robot:
+    """Return the independent solver of an arm (a1, a2, c1, c2, c3, c4) with the controller's signs."""
+    model = opw.KinematicModel(
+        **dict(zip(("a1", "a2", "c1", "c2", "c3", "c4"), map(float, lengths_mm), strict=True)),
+        b=0.0,
+        offsets=(0.0, -90.0 if degrees else -math.pi / 2, 0.0, 0.0, 0.0, 0.0),
+        flip_axes=(True, False, False, True, False, True),
+    )
+    return opw.Robot(model, degrees=degrees)
+
+
 class Kr300:
     """The KR 300 R2500 ultra by an OPW solver; angles in degrees with the controller's signs and zero."""
 
@@ -162,18 +173,7 @@ class Kr300:
     """A3 of the stretched arm."""
 
     def __init__(self) -> None:
-        model = opw.KinematicModel(
-            a1=350,
-            a2=41,
-            b=0,
-            c1=675,
-            c2=1150,
-            c3=1000,
-            c4=240,
-            offsets=(0, -90, 0, 0, 0, 0),
-            flip_axes=(True, False, False, True, False, True),
-        )
-        self.solver = opw.Robot(model, degrees=True)
+        self.solver = opw_solver((350, 41, 675, 1150, 1000, 240), degrees=True)
 
     def forward(self, joints_deg: np.ndarray) -> RigidTransform:
         """Return the flange in the robot root."""

@@ -8,7 +8,6 @@ import pytest
 from gcode2krl.krl.controller_state import may_disturb
 from gcode2krl.krl.read import read_krl
 from gcode2krl.krl.rules import rule_issues, state_issues
-from tests.krl.conftest import verified
 
 MAGAZINE = {"tool_change": "MAGAZINE({{ tool }})", "program": {"externals": ["MAGAZINE(INT :IN)"]}}
 BY_HAND = {"tool_change": "HALT ; change to tool {{ tool }} by hand"}
@@ -72,7 +71,7 @@ def test_speed_and_approximation_are_not_carried_over_a_call(make):
     made.src.write_bytes("\n".join(lines).encode("ascii"))
     program = read_krl(made.src)
     assert np.isnan(program.cdis_mm).any()
-    assert not verified(made.src, made.toolpath, made.cell).ok
+    assert not made.verified().ok
 
 
 def without_guard(lines, change):
@@ -141,7 +140,7 @@ def test_files_of_a_split_program_declare_what_they_call(make):
     assert len(calling) == 1
     assert b"EXT MAGAZINE(INT :IN)" in calling[0]
     assert b"EXT BAS" in calling[0]
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 @pytest.mark.parametrize(

@@ -63,17 +63,14 @@ def test_the_bytes_are_those_of_a_program_held_as_a_whole(run, tmp_path, request
     (tmp_path / "part.nc").write_text(OTHER.get(way, PART), encoding="ascii")
     (tmp_path / "cell.toml").write_text(CELL, encoding="utf-8")
     command = ("part.nc", "-o", "part.src", "--cell", "cell.toml", "--json", *WAYS[way])
-    whole = run(*command)
-    assert whole.code == 0, whole.err
+    whole = run(*command, code=0)
     written = contents(tmp_path)
     request.getfixturevalue("small")
-    pieces = run(*command)
-    assert pieces.code == 0, pieces.err
+    pieces = run(*command, code=0)
     assert contents(tmp_path) == written
     assert json.loads(pieces.out) == json.loads(whole.out)
     if way != "offline":
-        again = run("verify", "part.src", "part.nc", "--cell", "cell.toml", "--json")
-        assert again.code == 0, again.out
+        run("verify", "part.src", "part.nc", "--cell", "cell.toml", "--json", code=0)
 
 
 @pytest.fixture

@@ -138,7 +138,7 @@ def test_all_files_are_written_together(online, tmp_path):
         data = file.read_bytes()
         assert data.isascii()
         assert data.count(b"\n") == data.count(b"\r\n") > 3
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     assert [i.code for i in made.program.issues if i.severity == "warning"] == []
 
 
@@ -176,7 +176,7 @@ def test_settings_of_the_cell_reach_program_and_files(make, cycle_s):
     assert "LIN_REL {Z 12.500} #TOOL" in text
     assert "$OUT[78] (on in T1)" in text
     assert "<IP_NUMBER>10.0.0.9<" in (made.src.parent / "B_ETH.xml").read_text("ascii")
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 @pytest.mark.parametrize("axis", ["+x", "-x", "-y", "-z"])
@@ -204,7 +204,7 @@ def test_long_programs_switch_rsi_in_the_main_program(online, split):
     parts = [file.read_text("ascii") for file in made.program.files if re.search(r"_\d{3}\.src$", file.name)]
     assert all("RSI" not in part for part in parts)
     assert len(parts) == (0 if split == "defs" else 3)
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert report.ok, [issue.text() for issue in report.issues]
 
 
@@ -240,7 +240,7 @@ def test_programs_that_must_not_be_corrected_in_one_go(online, make, tmp_path, c
 
 def test_a_halt_may_be_released_and_a_tool_change_may_not(online):
     made = online(REFUSED["a halt"][0], allow=["online-halt:13"])
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     with pytest.raises(NotUnderstoodError, match="cannot be released"):
         online(REFUSED["two tools"][0], allow=["online-tool:13"])
 
@@ -346,7 +346,7 @@ def test_tampering_is_noticed(online, case):
     edit, code = TAMPERINGS[case]
     made = online()
     tampered(made, edit)
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert not report.ok
     assert code in {issue.code for issue in errors(report)}, [issue.text() for issue in errors(report)]
 
@@ -360,7 +360,7 @@ def test_the_files_beside_the_program_are_looked_at(online, file_name, deed):
         file.unlink()
     else:
         file.write_text(file.read_text("ascii").replace('"2.5"', '"25"').replace("49152", "49153"), "ascii")
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert [issue.code for issue in errors(report)] == ["rsi-file"]
     assert file_name in errors(report)[0].message
 
@@ -377,7 +377,7 @@ def test_laid_out_anew_it_still_verifies(online):
     text = made.src.read_bytes().decode("ascii")
     for rewritten in (text.lower(), text.replace("\r", ""), re.sub(r"(?m)^;.*\r?\n", "", text)):
         made.src.write_bytes(rewritten.encode("ascii"))
-        report = verified(made.src, made.toolpath, made.cell)
+        report = made.verified()
         assert report.ok, [issue.text() for issue in report.issues]
 
 

@@ -1,10 +1,8 @@
-"""The end of a program with the spindle on, and what a person who jogs is told of base and tool."""
+"""How a program begins and ends."""
 
 import re
 
 import pytest
-
-from tests.krl.conftest import verified
 
 pytestmark = pytest.mark.slow
 
@@ -37,7 +35,7 @@ def test_spindle_and_coolant_stop_above_the_work_before_home(make, end, coolant,
     assert after[1:3] == OFF
     assert "$OUT[1]=FALSE" not in after[home:]
     assert ("$OUT[3]=FALSE" in after[:home]) == bool(coolant)
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     notes = [issue for issue in made.program.issues if issue.code == "stopped-by-end"]
     assert [note.severity for note in notes] == ["note"]
     assert ("coolant" in notes[0].message) == bool(coolant)
@@ -57,7 +55,7 @@ def test_verify_insists_that_the_spindle_stops_before_home(make):
     assert off < home
     lines.insert(home, lines.pop(off))
     made.src.write_text("\r\n".join(lines) + "\r\n")
-    assert not verified(made.src, made.toolpath, made.cell).ok
+    assert not made.verified().ok
 
 
 def test_after_g28_the_spindle_stops_before_the_way_to_home(make):
@@ -65,14 +63,14 @@ def test_after_g28_the_spindle_stops_before_the_way_to_home(make):
     after = end_of(made)
     assert after[1:3] == OFF
     assert after[4].startswith("PTP {A1")
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_what_is_switched_on_at_home_is_switched_off_after_it(make):
     made = make(HEAD.format(coolant="") + "M5\nG28 X0 Y0\nS5000 M3\nM30\n")
     after = end_of(made)
     assert after.index("$OUT[1]=TRUE") < len(after) - 1 - after[::-1].index("$OUT[1]=FALSE")
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 # --- base and tool without a number -----------------------------------------------------------------------
@@ -109,6 +107,6 @@ def test_the_head_says_which_number_is_not_that_in_use(make, numbered_base, numb
         assert told < body.index("PTP {"), "before anything stops where a person may jog"
         assert body.index("SET_KRLMSG(#NOTIFY", told) > 0
         assert len(re.search(r'MSG_TXT\[\] "([^"]*)"', message[0])[1]) <= 80
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     for name in ("$ACT_BASE", "$ACT_TOOL"):
         assert f"{name}=" not in text, "only KUKA's BAS sets it"

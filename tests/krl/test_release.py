@@ -4,7 +4,7 @@ import pytest
 
 from gcode2krl.errors import Issue, NotUnderstoodError, RefusedError
 from gcode2krl.krl.release import header_words, matching, released
-from tests.krl.conftest import PART, verified
+from tests.krl.conftest import PART
 
 CLEAN = "G21 G90 G17\nT1 M6\nG0 G43 H1 Z50\nS12000 M3\nX0 Y0\nG1 Z-2 F600\nX50 F1500\nG0 Z50\nM5\nM30\n"
 FOUND = (
@@ -62,7 +62,7 @@ def test_a_program_with_all_of_a_kind_released(make):
     made = make(text, allow=["m-code-unmapped"])
     head = made.src.read_text("ascii").split("DECL")[0]
     assert "; findings released by hand: m-code-unmapped (whole file, 2)\n" in head
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_on_the_command_line_releases_of_later_stages_are_no_slips(run, tmp_path):
@@ -72,10 +72,9 @@ def test_on_the_command_line_releases_of_later_stages_are_no_slips(run, tmp_path
     cell = tmp_path / "cell.toml"
     stock = "[stock]\nbox_mm = [[-10.0, -10.0, -20.0], [60.0, 60.0, 0.0]]\n"
     cell.write_text(f'based_on = "demonstration"\n{stock}', encoding="ascii")
-    refused = run(part, "--cell", cell, "--allow", "m-code-unmapped")
-    assert refused.code == 1
-    assert "[rapid-in-stock]" in refused.err
-    done = run(part, "--cell", cell, "--allow", "m-code-unmapped", "--allow", "rapid-in-stock", "-o", "a.src")
-    assert done.code == 0, done.err
+    assert "[rapid-in-stock]" in run(part, "--cell", cell, "--allow", "m-code-unmapped", code=1).err
+    run(
+        part, "--cell", cell, "--allow", "m-code-unmapped", "--allow", "rapid-in-stock", "-o", "a.src", code=0
+    )
     head = (tmp_path / "a.src").read_text(encoding="ascii")
     assert "m-code-unmapped (whole file, 1), rapid-in-stock (whole file, " in head

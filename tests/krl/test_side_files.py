@@ -187,8 +187,7 @@ def test_the_axis_of_home_that_differs_is_named(make, run, change, words):
     assert len(found) == 1
     assert found[0].line > 0
     assert [word for word in words if word not in found[0].message] == []
-    done = run("verify", made.src, made.part)
-    assert done.code == 1
+    done = run("verify", made.src, made.part, code=1)
     assert "nan" not in (done.out + done.err).lower()
 
 

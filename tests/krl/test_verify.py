@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gcode2krl.cli.main import main
 from gcode2krl.errors import NotUnderstoodError
 from tests.cells import OWN_CELL
 from tests.krl.conftest import Made, verified
@@ -18,50 +17,39 @@ def line_of(lines, pattern, occurrence=0):
     return [k for k, line in enumerate(lines) if re.search(pattern, line)][occurrence]
 
 
-def change(pattern, replace, occurrence=0):
-    """Return an edit: the first group of the pattern is replaced by ``replace(group)``."""
+def put(of, pattern, occurrence=0, count=1):
+    """Return an edit: so many lines from the one that matches become ``of(lines)``; it returns the place."""
 
     def edit(lines):
         at = line_of(lines, pattern, occurrence)
-        found = re.search(pattern, lines[at])
-        a, b = found.span(1)
-        lines[at] = lines[at][:a] + replace(found[1]) + lines[at][b:]
+        lines[at : at + count] = of(lines[at : at + count])
         return at
 
     return edit
+
+
+def change(pattern, replace, occurrence=0):
+    """Replace the first group of the pattern by ``replace(group)``."""
+
+    def changed(lines):
+        a, b = re.search(pattern, lines[0]).span(1)
+        return [lines[0][:a] + replace(lines[0][a:b]) + lines[0][b:]]
+
+    return put(changed, pattern, occurrence)
 
 
 def delete(pattern, occurrence=0):
-    """Return an edit that deletes a line; noticed in the line that now stands there."""
-
-    def edit(lines):
-        at = line_of(lines, pattern, occurrence)
-        del lines[at]
-        return at
-
-    return edit
+    """Noticed in the line that now stands there."""
+    return put(lambda _: [], pattern, occurrence)
 
 
 def insert(text, before, occurrence=0):
-    """Return an edit that inserts a line."""
-
-    def edit(lines):
-        at = line_of(lines, before, occurrence)
-        lines.insert(at, text + "\r")
-        return at
-
-    return edit
+    return put(lambda _: [text + "\r"], before, occurrence, count=0)
 
 
 def swap(pattern, occurrence=0):
-    """Return an edit that swaps a line with the next."""
-
-    def edit(lines):
-        at = line_of(lines, pattern, occurrence)
-        lines[at : at + 2] = lines[at + 1], lines[at]
-        return at
-
-    return edit
+    """Swap a line with the next."""
+    return put(lambda lines: lines[::-1], pattern, occurrence, count=2)
 
 
 def swap_lin(lines):
@@ -173,7 +161,7 @@ def made(shared):
 def test_tampering_is_noticed(made, name):
     edit, code = TAMPERINGS[name]
     line = tampered(made, edit)
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert not report.ok
     found = [issue for issue in errors(report) if code in (None, issue.code)]
     assert found, [issue.text() for issue in errors(report)]
@@ -189,25 +177,19 @@ def test_tampering_is_noticed(made, name):
 
 
 @pytest.mark.parametrize("name", list(TAMPERINGS)[::8])
-def test_the_command_refuses_what_was_tampered_with(made, name, capsys):
+def test_the_command_refuses_what_was_tampered_with(made, name, run):
     edit, code = TAMPERINGS[name]
     tampered(made, edit)
-    with pytest.raises(SystemExit) as leaving:
-        main(["verify", str(made.src), str(made.part), "-q"])
-    assert leaving.value.code == 1
-    assert f"[{code}]" in capsys.readouterr().err
+    assert f"[{code}]" in run("verify", made.src, made.part, "-q", code=1).err
 
 
-def test_untouched_program_verifies(make, capsys):
+def test_untouched_program_verifies(make, run):
     made = make()
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert report.ok
     assert report.motions == report.intended == len(made.targets)
     assert report.max_deviation_mm <= 0.001
-    with pytest.raises(SystemExit) as leaving:
-        main(["verify", str(made.src), str(made.part)])
-    assert leaving.value.code == 0
-    assert "agrees" in capsys.readouterr().out
+    assert "agrees" in run("verify", made.src, made.part, code=0).out
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.7, 0.9, 0.99])
@@ -215,7 +197,7 @@ def test_truncated_file_is_noticed(make, share):
     made = make()
     data = made.src.read_bytes()
     made.src.write_bytes(data[: int(share * len(data))])
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert not report.ok
     assert "krl-structure" in {issue.code for issue in errors(report)}
 
@@ -225,7 +207,7 @@ def test_no_program_at_all(make, text):
     made = make()
     made.src.write_bytes(text)
     with pytest.raises(NotUnderstoodError, match="no-def"):
-        verified(made.src, made.toolpath, made.cell)
+        made.verified()
 
 
 def test_program_of_another_part_is_noticed(make, tmp_path):
@@ -244,7 +226,7 @@ def test_program_of_another_cell_is_noticed(make):
 def test_worst_lines_name_the_line_of_the_gcode(make):
     made = make()
     line = tampered(made, TAMPERINGS["X by 0.01 mm"][0])
-    worst = verified(made.src, made.toolpath, made.cell).worst[0]
+    worst = made.verified().worst[0]
     assert worst["line"] == line
     assert worst["gcode_line"] == 10
     assert worst["deviation_mm"] == pytest.approx(0.01)
@@ -280,11 +262,11 @@ REWRITINGS = {
 @pytest.mark.parametrize("name", REWRITINGS)
 def test_equal_program_by_hand_verifies(make, name):
     made = make()
-    text = made.src.read_bytes().decode("ascii")
+    text = made.text
     rewritten = REWRITINGS[name](text)
     assert rewritten != text
     made.src.write_bytes(rewritten.encode("ascii"))
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert report.ok, [issue.text() for issue in errors(report)]
     assert report.motions == report.intended
 
@@ -312,7 +294,7 @@ def test_parts_of_a_long_program(make, tmp_path, split, most):
     folder.mkdir()
     parts = type(whole)(folder, ZIGZAG, "whole", {"program": {"max_lines": most}}, split=split)
     assert motions_of(parts.src) == motions_of(whole.src)
-    report = verified(parts.src, parts.toolpath, parts.cell)
+    report = parts.verified()
     assert report.ok, [issue.text() for issue in errors(report)]
     assert report.motions == len(whole.targets)
     text = "".join(file.read_text("ascii") for file in folder.glob("*.src"))
@@ -336,7 +318,7 @@ def test_messages_in_parts_that_begin_in_a_blended_corner(make, tmp_path, split)
     made = make(part, data={"program": {"max_lines": 100}}, split=split)
     text = "".join(file.read_text("ascii") for file in tmp_path.rglob("*.src"))
     assert text.index('"nearly done"') > text.rindex("GK_PAR[1]={") > text.rindex("DECL KRLMSG_T")
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     usual = make(part, stem="usual")
     assert verified(made.src, made.toolpath, usual.cell).ok, "how it is split is no difference"
 
@@ -367,7 +349,7 @@ def test_tampered_part_file_is_noticed(make, deed):
         line = line_of(lines, r"^LIN", 20)
         lines[line] = lines[line].replace("Z -1.000", "Z -1.010")
         second.write_text("\r\n".join(lines) + "\r\n", "ascii")
-    report = verified(made.src, made.toolpath, made.cell)
+    report = made.verified()
     assert not report.ok
     if deed == "changed":
         found = [issue for issue in errors(report) if issue.code == "verify-position"]

@@ -1,11 +1,13 @@
-"""Straight parts of motions, and the instants at which a path is reached and left, beside closed forms."""
+"""When the controller reads and starts motions, and how triggers are placed by it."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gcode2krl.krl.windows import _Clock, _straight_parts
+from gcode2krl.krl.announce import lasting
+from gcode2krl.krl.triggers import place_triggers
+from gcode2krl.krl.windows import Windows, _Clock, _straight_parts
 from tests.cells import over_demonstration
 
 ACCELERATION_MM_S2, TOP_MM_S, CRUISE_S = 2000.0, 100.0, 1.0
@@ -88,3 +90,54 @@ def test_corners_take_their_part_of_both_motions():
     np.testing.assert_allclose(tail_mm, [*tails, 0.0], rtol=1e-12)
     expected_mm = np.maximum(length_mm - heads - [*tails, 0.0], 0.0)
     np.testing.assert_allclose(straight_mm, expected_mm, rtol=0, atol=1e-12)
+
+
+CYCLE_S, OFF_S = 0.012, 0.0015
+"""A motion's start in the samples may be so far off on either side."""
+
+
+def windows_of_short_motions(chance, count):
+    """Return motions of 5 to 60 ms with corners of up to 4 ms between."""
+    length, corner = chance.uniform(0.005, 0.060, count), chance.uniform(0.0, 0.004, count)
+    begin = np.concatenate([[0.0], np.cumsum(length + corner)[:-1]])
+    row = np.arange(1, count + 1)
+    zero = np.zeros(count)
+    return Windows(
+        row,
+        row,
+        begin,
+        begin + length,
+        begin,
+        begin + length,
+        zero,
+        zero,
+        np.zeros(1),
+        np.zeros(0),
+        np.zeros(0),
+    )
+
+
+def test_triggers_of_two_motions_never_act_in_one_cycle():
+    chance = np.random.default_rng(1)
+    cell = over_demonstration()
+    between = 0
+    for _ in range(40):
+        windows = windows_of_short_motions(chance, 60)
+        knot_s = 0.5 + np.cumsum(chance.choice([CYCLE_S, 0.02, 0.1], 20))
+        triggers = place_triggers(knot_s - 0.042, np.zeros(20), windows, cell)
+        placed = triggers.row >= 0
+        fire_s, row = triggers.fire_s[placed], triggers.row[placed]
+        gap_s, other = np.diff(fire_s), np.diff(row) > 0
+        between += int((gap_s[other] < 0.02).sum())
+        assert (gap_s >= CYCLE_S - 1e-9).all()
+        assert (gap_s[other] >= CYCLE_S + 2 * OFF_S - 1e-9).all()
+    assert between > 50, "the case occurs"
+
+
+def test_one_end_at_a_standstill_is_no_time_lost():
+    assert lasting(np.array([0.0, 0.0, -0.168, 0.0, 0.0])).max() == 0.0
+
+
+def test_a_delay_that_stays_is_found_where_it_begins():
+    assert np.flatnonzero(lasting(np.array([0.0, 0.0, 0.02, 0.02, 0.02])) > 0.006)[0] == 2
+    assert lasting(np.array([0.0, 0.02])).max() == 0.02, "the last one counts"

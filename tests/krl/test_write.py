@@ -17,13 +17,8 @@ from gcode2krl import set_targets, write_krl
 from gcode2krl.errors import NotUnderstoodError, RefusedError
 from gcode2krl.krl.number_text import fixed, motion_lines
 from tests.cells import OWN_CELL, over_demonstration, signed
-from tests.krl.conftest import PART, read, verified
+from tests.krl.conftest import PART, read
 from tests.krl.replay import components, frame
-
-
-def text_of(made) -> str:
-    return made.src.read_bytes().decode("ascii")
-
 
 # --- names ----------------------------------------------------------------------------------------------
 
@@ -47,11 +42,11 @@ def test_name_from_the_file(make, stem, name):
     made = make(stem=stem, into_folder=True)
     assert made.program.name == name
     assert made.src.stem.upper() == name
-    assert re.findall(r"(?m)^DEF (\w+)\( \)", text_of(made)) == [name]
+    assert re.findall(r"(?m)^DEF (\w+)\( \)", made.text) == [name]
     assert re.findall(r"(?m)^DEFDAT (\w+)", made.program.files[1].read_text("ascii")) == [name]
     codes = [issue.code for issue in made.program.issues if issue.code == "krl-name"]
     assert codes == ([] if name == stem.upper() else ["krl-name"])
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 @pytest.mark.parametrize("name", ["job_7", "JOB_7", "A" * 24, "_X"])
@@ -59,7 +54,7 @@ def test_name_given(make, name):
     made = make(name=name, into_folder=True)
     assert made.program.name == name.upper()
     assert made.src.name == f"{name}.src"
-    assert f"DEF {name.upper()}( )\r\n" in text_of(made)
+    assert f"DEF {name.upper()}( )\r\n" in made.text
     assert "krl-name" not in [issue.code for issue in made.program.issues]
 
 
@@ -84,7 +79,7 @@ def test_parts_have_names_of_their_own(make, name, split):
     names = re.findall(r"(?m)^DEF (\w+)", text)
     assert len(names) == len(set(names)) > 3
     assert max(map(len, names)) <= 24
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_parts_of_two_programs_in_one_folder_do_not_collide(make):
@@ -93,7 +88,7 @@ def test_parts_of_two_programs_in_one_folder_do_not_collide(make):
     first = make(long_part(150), stem="HOUSING_LEFT_SIDE_OP10A", split="files", data=data)
     second = make(long_part(160), stem="HOUSING_LEFT_SIDE_OP10B", split="files", data=data)
     assert not set(first.program.files) & set(second.program.files)
-    assert verified(first.src, first.toolpath, first.cell).ok
+    assert first.verified().ok
 
 
 def long_part(moves: int) -> str:
@@ -122,7 +117,7 @@ def test_every_byte_is_fit_for_the_controller(make, options):
     assert len(re.findall(rb"(?m)^END\r$", made.src.read_bytes())) == len(
         re.findall(rb"(?m)^DEF ", made.src.read_bytes())
     )
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_same_input_same_bytes(make):
@@ -133,7 +128,7 @@ def test_same_input_same_bytes(make):
 
 
 def test_no_date_and_no_folder_in_the_text(make, tmp_path):
-    text = text_of(make())
+    text = make().text
     assert str(tmp_path) not in text
     assert not re.search(r"\d{4}-\d{2}-\d{2}|\d{2}:\d{2}", text)
 
@@ -211,7 +206,7 @@ def test_refused_program_leaves_the_old_files(make):
 
 
 def test_cell_that_nobody_verified_halts_first(make):
-    text = text_of(make())
+    text = make().text
     assert "HAS NOT BEEN VERIFIED" in text
     assert re.search(r"(?m)^HALT\r$", text).start() < re.search(r"(?m)^(PTP|LIN|WHILE)", text).start()
 
@@ -221,7 +216,7 @@ def test_verified_cell_does_not_halt(make):
         PART.split("T2 M6")[0] + "M30\n",
         data=signed(OWN_CELL | {"tool_change": "; changed by hand"}),
     )
-    text = text_of(made)
+    text = made.text
     assert "cell verified by A. Person on 2026-01-31" in text
     assert "HAS NOT BEEN VERIFIED" not in text
     guarded = re.sub(r"(?ms)^WHILE.*?^ENDWHILE", "", text)
@@ -230,7 +225,7 @@ def test_verified_cell_does_not_halt(make):
 
 
 def test_header_says_what_is_not_checked(make):
-    head = text_of(make()).split("PTP {")[0]
+    head = make().text.split("PTP {")[0]
     assert "not a safety function" in head
     assert "NOT CHECKED" in head
 
@@ -240,12 +235,12 @@ def test_released_findings_stand_in_the_header(make):
     with pytest.raises(RefusedError, match="m-code-unmapped"):
         make(text)
     made = make(text, allow=["m-code-unmapped:11"])
-    assert "; findings released by hand: m-code-unmapped:11\r\n" in text_of(made)
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert "; findings released by hand: m-code-unmapped:11\r\n" in made.text
+    assert made.verified().ok
 
 
 def test_no_guard_is_recorded(make):
-    guarded, bare = text_of(make()), text_of(make(stem="bare", guard=False))
+    guarded, bare = make().text, make(stem="bare", guard=False).text
     assert "--no-guard" not in guarded
     assert "LEFT OUT (--no-guard)" in bare
     assert "$TRAFONAME" in guarded
@@ -255,9 +250,9 @@ def test_no_guard_is_recorded(make):
 
 def test_program_without_guard_verifies_as_such(make):
     made = make(guard=False)
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
     made.src.write_bytes(made.src.read_bytes().replace(b"(--no-guard)", b"(        )"))
-    assert not verified(made.src, made.toolpath, made.cell).ok
+    assert not made.verified().ok
 
 
 def test_guard_stands_before_any_motion(make):
@@ -267,7 +262,7 @@ def test_guard_stands_before_any_motion(make):
             {"number": 9, "meaning": "air"},
         ]
     }
-    text = text_of(make(data=data))
+    text = make(data=data).text
     head = text[: re.search(r"(?m)^(PTP|LIN)", text).start()]
     assert re.findall(r"WHILE (\$IN\[\d+\]<>\w+)", head) == ["$IN[17]<>FALSE", "$IN[9]<>TRUE"]
     assert "Input 17: door closed" in head
@@ -288,7 +283,7 @@ def test_frames_by_number_are_compared(make):
     tool = {"1": {"tool_data": 4, "axis": "+x", "frame": FRAME}}
     data = {"tool": tool, "frames": {"base": BASE, "base_data": 12}}
     made = make(PART.split("T2 M6")[0] + "M30\n", data=data)
-    text = text_of(made)
+    text = made.text
     assert "BAS (#TOOL,4 )" in text
     assert "BAS (#BASE,12 )" in text
     assert not re.search(r"(?m)^\$(BASE|TOOL|LOAD)=", text)
@@ -309,7 +304,7 @@ def test_poses_are_turned_into_the_tools_own_axes(make):
     """With the tool along +x, x of the written pose points from tip to holder."""
     tool = {"1": {"tool_data": 4, "axis": "+x", "frame": FRAME}}
     made = make(PART.split("T2 M6")[0] + "M30\n", data={"tool": tool})
-    poses = [components(values) for values in re.findall(r"(?m)^LIN \{(.*)\}", text_of(made))]
+    poses = [components(values) for values in re.findall(r"(?m)^LIN \{(.*)\}", made.text)]
     assert poses
     for pose in poses:
         x_axis = Rotation.from_euler("ZYX", [pose[key] for key in "ABC"], degrees=True).as_matrix()[:, 0]
@@ -320,7 +315,7 @@ def test_poses_are_turned_into_the_tools_own_axes(make):
 def test_tool_frame_follows_the_length(make):
     """A tool 30 mm longer has its tip 30 mm further along its axis."""
     made = make(data={"tool": {"2": {"length_mm": 130.0}}})
-    frames = [frame(components(values)) for values in re.findall(r"(?m)^\$TOOL=\{(.*?)\}", text_of(made))]
+    frames = [frame(components(values)) for values in re.findall(r"(?m)^\$TOOL=\{(.*?)\}", made.text)]
     short, long = frames[0], frames[-1]
     difference = short.inv() * long
     assert difference.translation == pytest.approx([0, 0, -30.0])
@@ -328,9 +323,9 @@ def test_tool_frame_follows_the_length(make):
 
 
 def test_spindle_waits_for_its_input_where_there_is_one(make):
-    with_input = text_of(make(data={"spindle": {"at_speed_input": 33}}))
+    with_input = make(data={"spindle": {"at_speed_input": 33}}).text
     assert re.search(r"\$OUT\[1\]=TRUE\r\nWAIT FOR \$IN\[33\]\r\n", with_input)
-    assert re.search(r"\$OUT\[1\]=TRUE\r\nWAIT SEC 5.0\r\n", text_of(make(stem="timed")))
+    assert re.search(r"\$OUT\[1\]=TRUE\r\nWAIT SEC 5.0\r\n", make(stem="timed").text)
 
 
 def test_external_subprograms_are_declared(make):
@@ -339,9 +334,9 @@ def test_external_subprograms_are_declared(make):
         "m_code": {"M3": "SPINDLE_ON({{ rpm | round | int }})", "M5": "SPINDLE_OFF( )"},
     }
     made = make(data=data)
-    text = text_of(made)
+    text = made.text
     assert text.index("EXT SPINDLE_ON(INT :IN)") < text.index(";FOLD INI") < text.index("SPINDLE_ON(8000)")
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_call_without_declaration_is_refused(make):
@@ -381,18 +376,18 @@ def test_template_with_an_error_is_refused(make, tmp_path, template):
 def test_template_of_any_form_verifies(make, template):
     """A template may begin with a wait: that is no dwell of the G-code."""
     made = make(PART.replace("G1 X40 F1500", "G1 X40 F1500\nM10"), data={"m_code": {"M10": template}})
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 @pytest.mark.parametrize("where", ["prologue", "epilogue"])
 @pytest.mark.parametrize("template", ["$OUT[50]=TRUE", "WAIT SEC 2.0", "$OUT[50]=TRUE\nWAIT FOR $IN[50]"])
 def test_prologue_and_epilogue(make, where, template):
     made = make(data={"program": {where: template}})
-    text = text_of(made)
+    text = made.text
     motions = [found.start() for found in re.finditer(r"(?m)^(PTP|LIN)", text)]
     at = text.rindex(template.split("\n")[0])
     assert at < motions[0] if where == "prologue" else at > motions[-1]
-    assert verified(made.src, made.toolpath, made.cell).ok
+    assert made.verified().ok
 
 
 def test_long_program_warns_with_the_split(make):
@@ -403,7 +398,7 @@ def test_long_program_warns_with_the_split(make):
 
 def test_comments_lead_back_to_the_gcode(make):
     made = make(data={"program": {"comment_every": 1}})
-    lines = text_of(made).splitlines()
+    lines = made.text.splitlines()
     pairs = [(int(k[7:]), m) for k, m in itertools.pairwise(lines) if re.fullmatch(r"; line \d+", k)]
     assert len(pairs) > 10
     for number, motion in pairs:
@@ -425,7 +420,7 @@ def test_comments_lead_back_to_the_gcode(make):
 def test_dwell_and_events_keep_their_order(make, order, wanted):
     """``M3``, ``G4 P3``: the spindle starts first and is then given its time."""
     text = "G21 G90 G54\nT1 M6\nG43 H1\nS9000 M4\nG0 X0 Y0\nG0 Z9\n" + order + "S9000 M3\nG1 Z-1 F600\nM30\n"
-    lines = text_of(make(text)).split("Z 9.000")[1].split("LIN")[0].splitlines()
+    lines = make(text).text.split("Z 9.000")[1].split("LIN")[0].splitlines()
     places = [lines.index(line) for line in wanted]
     assert places == sorted(places)
 

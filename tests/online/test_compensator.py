@@ -22,8 +22,8 @@ from gcode2krl.online.compensator import (
     stream,
 )
 from gcode2krl.online.pilot_gate import Announced
-from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.units import RAD_PER_DEG
+from tests.online import pilot_of
 
 COUNT = 400
 CALIBRATION = Calibration(
@@ -36,16 +36,8 @@ CALIBRATION = Calibration(
 
 
 def pilot():
-    time_s = np.array([0.2, 0.5, 1.2, 1.3])
-    knots = Knots(
-        line=np.ones(4, dtype=np.int32),
-        path_mm=25.0 * time_s,
-        time_s=time_s,
-        lead_s=np.full(4, 0.04),
-        force_N=np.array([[0, 0, 0], [0, 400, 50], [0, 400, 50], [0, 0, 0.0]]),
-        deflection_mm=np.zeros((4, 3)),
-    )
-    return knots, PilotHeader("tcp", "index", "$SEN_PINT[1]", 0.04, 99)
+    force_N = [[0, 0, 0], [0, 400, 50], [0, 400, 50], [0, 0, 0]]
+    return pilot_of([0.2, 0.5, 1.2, 1.3], force_N, frame="tcp", checksum=99)
 
 
 def samples(cell, seed=1):

@@ -6,6 +6,8 @@ import pytest
 from gcode2krl import robot
 from gcode2krl.online.plant import reaction, tip_shift_mm, with_backlash
 from gcode2krl.units import RAD_PER_DEG
+from tests.conftest import draws
+from tests.online import faults
 
 TIME_S = 0.004 * np.arange(500)
 
@@ -63,3 +65,22 @@ def test_the_tip_shifts_by_what_forward_kinematics_says(cell):
     moved = q + np.array([[1e-3, 0, 0, 0, 0, 0], [0, 1e-3, 0, 0, 0, 0], [0, 0, 0, 2e-3, 0, 1e-3]])
     exact = robot.forward(moved, cell, 1)[0] - robot.forward(q, cell, 1)[0]
     np.testing.assert_allclose(tip_shift_mm(moved, q, cell, 1), exact, atol=1e-9)
+
+
+
+
+def check(report):
+    assert report.violations == []
+    assert 0.99 < report.largest_step <= 1.0 + faults.ROUNDING  # the limit is reached, or nothing is tested
+    assert report.largest_rate <= 1.0 + faults.ROUNDING
+    assert report.answers > 0.5 * report.cycles
+
+
+@pytest.mark.slow
+def test_no_fault_in_any_state_makes_a_step():
+    report = faults.drive(draws(40_000), seed=11)
+    check(report)
+    ends = set(report.ended)
+    assert {"held too-far", "closed adds-up", "closed restarted", "held sensor", "zero adds-up"} <= ends
+    met = {(phase.value, name) for phase in faults.PHASES for name in faults.FAULTS}
+    assert len(met & report.met) > 0.95 * len(met)

@@ -8,9 +8,9 @@ from gcode2krl.cell.sections.online import Online
 from gcode2krl.compliance import deflection_of
 from gcode2krl.errors import NotUnderstoodError
 from gcode2krl.online.log_replay import as_json, columns, replay
-from gcode2krl.pilot import Knots, PilotHeader
 from gcode2krl.runs import load_run
 from gcode2krl.units import DEG_PER_RAD
+from tests.online import pilot_of
 
 HEAD = 'override_percent = 100.0\nmode = "AUT"\n[frames]\ntracker = "base"\nforce = "base"\n'
 
@@ -68,17 +68,8 @@ def test_most_of_a_measured_deviation_would_have_gone(cell, run):
 
 
 def test_with_pilot_the_ends_are_better(cell, run):
-    time_s = np.array([0.6, 1.0, 1.3, 2.6, 4.0, 4.3])
     share = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
-    knots = Knots(
-        line=np.ones(6, dtype=np.int32),
-        path_mm=25.0 * time_s,
-        time_s=time_s,
-        lead_s=np.full(6, 0.04),
-        force_N=share[:, None] * np.array([-100.0, 400.0, -60.0]),
-        deflection_mm=np.zeros((6, 3)),
-    )
-    header = PilotHeader("base", "index", "$SEN_PINT[1]", 0.04, 1)
+    knots, header = pilot_of([0.6, 1.0, 1.3, 2.6, 4.0, 4.3], share[:, None] * [-100.0, 400.0, -60.0])
     plain = as_json(replay(run[0], cell, Online(threshold_N=60.0)))
     piloted = as_json(replay(run[0], cell, Online(threshold_N=60.0), knots=knots, header=header))
     assert piloted["pilot_cycles"] > 0
@@ -88,16 +79,7 @@ def test_with_pilot_the_ends_are_better(cell, run):
 @pytest.mark.parametrize("head", [HEAD.replace("100.0", "50.0"), HEAD.replace("AUT", "T1")])
 def test_a_run_at_another_override_or_in_t1_has_no_pilot(cell, tmp_path, head):
     write_run(tmp_path / "run", cell, head=head)
-    time_s = np.array([0.6, 1.0, 1.3, 2.6, 4.0, 4.3])
-    knots = Knots(
-        line=np.ones(6, dtype=np.int32),
-        path_mm=25.0 * time_s,
-        time_s=time_s,
-        lead_s=np.full(6, 0.04),
-        force_N=np.ones((6, 3)),
-        deflection_mm=np.zeros((6, 3)),
-    )
-    header = PilotHeader("base", "index", "$SEN_PINT[1]", 0.04, 1)
+    knots, header = pilot_of([0.6, 1.0, 1.3, 2.6, 4.0, 4.3], np.ones((6, 3)))
     found = as_json(replay(load_run(tmp_path / "run"), cell, Online(), knots=knots, header=header))
     assert "open" not in found["gate_cycles"]
 

@@ -10,7 +10,7 @@ from gcode2krl.online.compensator import build_compensator
 from gcode2krl.online.pilot_gate import Gate
 from gcode2krl.online.session import Phase, begin, exchange, silent
 from gcode2krl.online.telegram import parse
-from gcode2krl.pilot import Knots, PilotHeader
+from tests.online import pilot_of
 from tests.online.conftest import Log, talk
 from tests.online.krc import Krc
 
@@ -262,16 +262,8 @@ def test_all_faults_at_once_come_to_rest(cell, device, settings):
 
 
 def pilot(form="index"):
-    time_s = np.array([0.6, 0.75, 1.4, 1.5])
-    knots = Knots(
-        line=np.ones(4, dtype=np.int32),
-        path_mm=25.0 * time_s,
-        time_s=time_s,
-        lead_s=np.full(4, 0.04),
-        force_N=np.array([[0, 0, 0], [0, 300, -50], [0, 310, -50], [0, 0, 0.0]]),
-        deflection_mm=np.zeros((4, 3)),
-    )
-    return knots, PilotHeader("base", form, "$SEN_PINT[1]", 0.04, 12345)
+    force_N = [[0, 0, 0], [0, 300, -50], [0, 310, -50], [0, 0, 0]]
+    return pilot_of([0.6, 0.75, 1.4, 1.5], force_N, form=form, checksum=12345)
 
 
 def telling(form, knots, checksum=12345, override=100):

@@ -197,8 +197,7 @@ def test_an_added_approach_is_not_held_to_the_tolerance_of_the_part(cell):
 
 @pytest.mark.slow
 def test_the_command_writes_tables_and_pictures(run, tmp_path):
-    done = run("predict", TEST_PIECE, "-o", "out", "--csv", "--plot", "--json", "--dt", "0.004")
-    assert done.code == 0, done.err
+    done = run("predict", TEST_PIECE, "-o", "out", "--csv", "--plot", "--json", "--dt", "0.004", code=0)
     result = json.loads(done.out)
     assert result["time_s"] > 60
     assert 0 < result["corner_error_mm"] <= 0.02
@@ -220,7 +219,6 @@ def test_the_command_writes_tables_and_pictures(run, tmp_path):
     [(["-o", "nowhere/out"], "cannot write"), (["--dt", "-1"], "not positive"), (["-o", "-"], "folder")],
 )
 def test_wrong_options_of_the_command(run, arguments, words):
-    done = run("predict", TEST_PIECE, *arguments)
-    assert done.code == 2
+    done = run("predict", TEST_PIECE, *arguments, code=2)
     assert words in done.err
     assert len(done.err.strip().splitlines()) == 1

@@ -7,18 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from gcode2krl import Gcode2KrlError, predict
+from gcode2krl import Gcode2KrlError
 from gcode2krl.figures import figures_of
 from gcode2krl.prediction.plots import FIGURES, Plots
 from gcode2krl.report.drawing import look
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(ROOT / "examples" / "test_piece.nc")
 
 
 def test_every_figure_has_a_method_and_every_method_is_a_figure():
@@ -36,8 +31,9 @@ def test_a_figure_is_one_of_matplotlib(prediction, name):
 
 @pytest.mark.slow
 def test_the_command_draws_the_same(prediction, run, tmp_path):
-    done = run("predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet", "--isolated")
-    assert done.code == 0, done.err
+    run(
+        "predict", ROOT / "examples" / "test_piece.nc", "-o", "out", "--plot", "--quiet", "--isolated", code=0
+    )
     assert {file.stem for file in (tmp_path / "out").glob("*.png")} == set(FIGURES)
     with look():
         prediction.plot.force().savefig(tmp_path / "force.png", dpi=150)

@@ -11,11 +11,6 @@ from gcode2krl.prediction.bundle import pass_numbers
 from tests.conftest import ROOT
 
 
-@pytest.fixture(scope="module")
-def prediction():
-    return predict(ROOT / "examples" / "test_piece.nc")
-
-
 def test_a_row_is_a_sample_with_what_every_stage_says_of_it(prediction):
     samples, motion = prediction.samples(), prediction.motion
     assert len(samples) == len(motion)

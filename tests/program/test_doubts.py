@@ -1,10 +1,14 @@
 """Doubtful programs: long dwells, wide corners, stops in the cut, absurd feeds per tooth."""
 
+import io
+
 import pytest
 
 from gcode2krl import load_cell, read_gcode
 from gcode2krl.errors import NotUnderstoodError
+from gcode2krl.gcode.read import read_stream
 from gcode2krl.pipeline import predict_toolpath, set_targets
+from gcode2krl.program.checks import check_toolpath
 from gcode2krl.program.doubts import doubtful
 from tests.cells import over_demonstration
 
@@ -142,3 +146,17 @@ def test_a_clamp_above_the_plane_where_the_program_goes(plan, at, top, found):
     made = plan(body, {"obstacle": [clamp]})
     keys = [i.key for i in doubtful(made.toolpath, made.cell) if i.code == "cell-contradiction"]
     assert keys == ["clearance.z_mm"] * found
+
+
+PART = b"G21\nT1 M6\nG43 H1\nS1000 M3\nG0 X0 Y0 Z50\nG1 Z110 F500\nG0 Z20\nG1 Z125\nM5\nM2\n"
+
+
+def test_the_remedy_names_the_highest_feed():
+    cell = load_cell()
+    found = [
+        i
+        for i in check_toolpath(read_stream(io.BytesIO(PART), "part.nc", cell), cell)
+        if i.code == "above-clearance"
+    ]
+    assert found
+    assert all("z_mm to 125.000 or more" in issue.remedy for issue in found)

@@ -1,14 +1,18 @@
 """Nothing goes below the table: feed, rapid, approach, inclined tools, compensated targets."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from gcode2krl import frames as fr
+from gcode2krl import load_cell, read_gcode, set_targets
 from gcode2krl.cell import resolve_cell
 from gcode2krl.chain import Plan
+from gcode2krl.compiled import chunks
+from gcode2krl.program import blending, targets
 from gcode2krl.program.table import below_table, lowest_points
+from tests.conftest import EXAMPLES
 
 HEAD = "G21 G90 G17\nT1 M6\nS9000 M3\nG0 G43 H1 Z30\n"
 TABLE = {"based_on": "demonstration", "table": {"z_mm": -10.0}}
@@ -84,8 +88,25 @@ def test_home_below_the_table_is_said(plan):
 def test_it_is_seen_without_forces(run, tmp_path):
     (tmp_path / "part.nc").write_text(HEAD + "G0 X0 Y0\nG0 Z2\nG1 Z-11 F600\nX50\nG0 Z30\nM5\nM30\n")
     (tmp_path / "cell.toml").write_text('based_on = "demonstration"\n[table]\nz_mm = -10\n')
-    done = run("part.nc", "-o", "part.src", "--cell", "cell.toml", "--no-forces")
-    assert done.code == 1
+    done = run("part.nc", "-o", "part.src", "--cell", "cell.toml", "--no-forces", code=1)
     assert "part.nc:7: error: T1 is up to 1.000 mm below the table" in done.err
     assert "below-table" in done.err
     assert not (tmp_path / "part.src").exists()
+
+
+@pytest.mark.parametrize("rows", [3, 50])
+@pytest.mark.parametrize("tolerance_mm", [None, 0.02])
+@pytest.mark.parametrize("part", EXAMPLES, ids=lambda path: path.stem)
+def test_same_targets(monkeypatch, part, rows, tolerance_mm):
+    cell = load_cell()
+    toolpath = read_gcode(part, cell)
+    whole = set_targets(toolpath, cell, tolerance_mm)
+    for module in (targets, blending):
+        monkeypatch.setattr(module, "chunk_borders", lambda count: chunks.chunk_borders(count, rows))
+    planned = set_targets(toolpath, cell, tolerance_mm)
+    for spec in fields(whole):
+        left, right = getattr(planned, spec.name), getattr(whole, spec.name)
+        if isinstance(left, np.ndarray):
+            np.testing.assert_array_equal(left, right, err_msg=spec.name)
+        else:
+            assert left == right, spec.name

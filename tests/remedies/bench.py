@@ -11,6 +11,7 @@ from pathlib import Path
 
 import tomli_w
 
+from gcode2krl.cell import Cell
 from gcode2krl.cli.main import _run
 from gcode2krl.errors import Gcode2KrlError
 from tests.cell.sound_cells import MILL
@@ -22,21 +23,23 @@ DRY = "translate part.nc --cell cell.toml --pilot none --no-forces -o out.src"
 WET = "translate part.nc --cell cell.toml --pilot none -o out.src"
 PREDICT = "predict part.nc --cell cell.toml -o prediction"
 VERIFY = "verify out.src part.nc --cell cell.toml"
-BASE = {
-    "words": DRY,
-    "options": "",
-    "change": {},
-    "head": HEAD,
-    "cut": CUT,
-    "tail": TAIL,
-    "cell.toml": MILL,
-}
+BASE = {"words": DRY, "options": "", "change": {}, "head": HEAD, "cut": CUT, "tail": TAIL, "cell.toml": MILL}
 """``words`` are commands that run one after the other, parted by ``; ``; the last is judged.
 
 The step ``change`` among them edits files as ``change`` says: a pair is old and new text, None removes.
 """
 
 
+UPRIGHT = [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]
+"""Axes in deg of an arm that stands at its usual HOME."""
+LIMITS_DEG = [
+    [-185.0, 185.0],
+    [-140.0, -5.0],
+    [-120.0, 155.0],
+    [-350.0, 350.0],
+    [-122.5, 122.5],
+    [-350.0, 350.0],
+]
 GONE = object()
 SPACE = "~~"
 """A space within a word of a command."""
@@ -64,14 +67,34 @@ def call(function):
     return function
 
 
+def block(x_mm, y_mm, low_mm=-10.0):
+    """Return the box of a stock that lies at the zero of the part."""
+    return [[0.0, 0.0, low_mm], [x_mm, y_mm, 0.0]]
+
+
 def case(wrong, *remedies, then=(), says=""):
     return Case(wrong, remedies, (then,) if isinstance(then, str) else tuple(then), says)
+
+
+def by_files(edit):
+    """Return an edit with its keys of the cell, such as ``frames.base.x_mm``, as tables of cell.toml."""
+    files = {}
+    for key, value in edit.items():
+        *path, last = key.split(".")
+        if [*path, last][0] not in Cell.model_fields or last in ("toml", "csv", "tbl", "zip"):
+            files[key] = value
+            continue
+        table = files.setdefault("cell.toml", {})
+        for step in path:
+            table = table.setdefault(step, {})
+        table[last] = value
+    return files
 
 
 def laid(state, edit):
     """Return the state under an edit: a pair is old and new text, tables go key by key, None removes."""
     merged = dict(state)
-    for key, value in edit.items():
+    for key, value in (by_files(edit) if "cell.toml" in state else edit).items():
         old = state.get(key)
         if value is None:
             merged.pop(key, None)

@@ -15,7 +15,7 @@ from gcode2krl.prediction.folder import UNFINISHED
 from tests.cell.setup.synthetic_archive import config_dat, machine_dat, write_zip
 from tests.cell.setup.test_urdf import file_of, stretched
 from tests.conftest import ROOT
-from tests.remedies.bench import BASE, DRY, PREDICT, call, case
+from tests.remedies.bench import BASE, DRY, PREDICT, block, call, case
 from tests.test_external_axes import ON_TABLE, TABLE, TABLE_MACHINE
 
 STATE = BASE
@@ -80,6 +80,14 @@ def parquet(content):
     written, table = io.BytesIO(), pq.read_table(io.BytesIO(content))
     pq.write_table(table.rename_columns(["a", *table.column_names[1:]]), written)
     return written.getvalue()
+
+
+def damaged(file, edit):
+    """Return the case of a prediction whose file was changed, and is made again."""
+    return case(
+        {"words": f"{FAST}; change; report prediction", "change": {file: edit}},
+        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    )
 
 
 CASES = {
@@ -164,47 +172,20 @@ CASES = {
         {"words": FAST + " --effects mine/a.py --effect sag:um_per_N=1", "mine/a.py": EFFECT},
         {"words": FAST + " --effects mine --effect sag:um_per_N=1"},
     ),
-    "effect-impossible": case(
-        {"words": FAST + " --effect other_program"},
-        {"words": FAST},
-    ),
+    "effect-impossible": case({"words": FAST + " --effect other_program"}, {"words": FAST}),
     # a prediction's folder
-    "prediction-unfinished": case(
-        {
-            "words": f"{FAST}; change; report prediction",
-            "change": {"prediction/prediction.toml": UNFINISHED.decode()},
-        },
-        {"words": f"{FAST}; change; {FAST}; report prediction"},
+    "prediction-unfinished": damaged("prediction/prediction.toml", UNFINISHED.decode()),
+    "prediction-damaged": damaged("prediction/motion.parquet", lambda content: content[:-500]),
+    "prediction-schema": damaged(
+        "prediction/prediction.toml", ("gcode2krl/prediction/", "gcode2krl/prediction/0")
     ),
-    "prediction-damaged": case(
-        {
-            "words": f"{FAST}; change; report prediction",
-            "change": {"prediction/motion.parquet": lambda content: content[:-500]},
-        },
-        {"words": f"{FAST}; change; {FAST}; report prediction"},
-    ),
-    "prediction-schema": case(
-        {
-            "words": f"{FAST}; change; report prediction",
-            "change": {"prediction/prediction.toml": ("gcode2krl/prediction/", "gcode2krl/prediction/0")},
-        },
-        {"words": f"{FAST}; change; {FAST}; report prediction"},
-    ),
-    "prediction-key": case(
-        {
-            "words": f"{FAST}; change; report prediction",
-            "change": {"prediction/prediction.toml": ('severity = "note"', "severity = 3")},
-        },
-        {"words": f"{FAST}; change; {FAST}; report prediction"},
-    ),
+    "prediction-key": damaged("prediction/prediction.toml", ('severity = "note"', "severity = 3")),
     "prediction-empty": case(
         {"words": f"{FAST}; call figure prediction force"},
         {
             "words": f"{PREDICT}; call figure prediction force",
-            "cell.toml": {
-                "material": {"model": "AW-2017A"},
-                "stock": {"box_mm": [[0.0, 0.0, -10.0], [40.0, 20.0, 0.0]]},
-            },
+            "material.model": "AW-2017A",
+            "stock.box_mm": block(40.0, 20.0),
         },
     ),
     # many parts
@@ -222,33 +203,19 @@ CASES = {
     ),
     # external axes
     "external-speed": case(
-        {
-            "cell.toml": {
-                "external": {"E1": {k: v for k, v in RAIL.items() if k not in ("speed", "acceleration")}}
-            },
-            "cut": FAR,
-        },
-        {"cell.toml": {"external": {"E1": RAIL}}},
+        {"external.E1": {k: v for k, v in RAIL.items() if k not in ("speed", "acceleration")}, "cut": FAR},
+        {"external.E1": RAIL},
     ),
-    "external-uncoupled": case(
-        {"cell.toml": {"external": {"E1": RAIL | {"coupled": False}}}, "cut": FAR},
-        {"cell.toml": {"external": {"E1": RAIL}}},
-    ),
+    "external-uncoupled": case({"external.E1": RAIL | {"coupled": False}, "cut": FAR}, {"external.E1": RAIL}),
     "external-moves": case(
-        {
-            "words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml",
-            "cell.toml": {"external": {"E1": RAIL}},
-        },
-        {"cell.toml": {"external": {"E1": RAIL | {"position": 0.0}}}},
+        {"words": f"{DRY}; runkit out.src -o kit --lift 50 --cell cell.toml", "external.E1": RAIL},
+        {"external.E1": RAIL | {"position": 0.0}},
     ),
-    "prediction-columns": case(
-        {"words": f"{FAST}; change; report prediction", "change": {"prediction/motion.parquet": parquet}},
-        {"words": f"{FAST}; change; {FAST}; report prediction"},
-    ),
+    "prediction-columns": damaged("prediction/motion.parquet", parquet),
     "external-limit": case(
         {"cell.toml": TURNING, "cut": ROUND},
-        {"cell.toml": {"external": {"E1": {"limits": [-2000.0, 2000.0]}}}},
-        {"cell.toml": {"external": {"E1": {"follows": None, "position": 0.0}}}},
+        {"external.E1.limits": [-2000.0, 2000.0]},
+        {"external.E1.follows": None, "external.E1.position": 0.0},
         then="collision",
     ),
     "urdf": case(

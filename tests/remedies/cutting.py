@@ -5,7 +5,7 @@ import trimesh
 from gcode2krl import cut, load_cell, plan_motion, read_gcode, set_targets
 from gcode2krl.cell.sections import VIRTUAL_JOINTS
 from gcode2krl.cutting import mean_force
-from tests.remedies.bench import BASE, PREDICT, WET, call, case, laid
+from tests.remedies.bench import BASE, LIMITS_DEG, PREDICT, WET, block, call, case, laid
 from tests.remedies.cell import OWN_ROBOT
 from tests.remedies.program import FIVE, A
 
@@ -14,10 +14,9 @@ STATE = laid(
     BASE,
     {
         "words": WET,
-        "cell.toml": {
-            "material": {"linear_edge": LIGHT},
-            "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]], "resolution_mm": 1.0},
-        },
+        "material.linear_edge": LIGHT,
+        "stock.box_mm": block(80.0, 40.0),
+        "stock.resolution_mm": 1.0,
     },
 )
 STEEL = {"Ktc": 2500.0, "Krc": 1000.0, "Kac": 500.0, "Kte": 40.0, "Kre": 40.0, "Kae": 5.0}
@@ -32,35 +31,12 @@ OPEN = trimesh.Trimesh(BLOCK.vertices, BLOCK.faces[:-1]).export(file_type="stl")
 LOWER = trimesh.creation.box(bounds=[[0, 2, -10], [80, 18, -8]]).export(file_type="stl")
 
 
-def tool(**keys):
-    return {"cell.toml": {"tool": {"1": keys}}}
-
-
-def stock(**keys):
-    return {"cell.toml": {"stock": keys}}
-
-
-def machine(**sections):
-    return {"cell.toml": sections}
-
-
 def all_joints(stiffness_Nmm_rad):
     return {name: dict.fromkeys(("k_c", "k_b", "k_a"), stiffness_Nmm_rad) for name in VIRTUAL_JOINTS}
 
 
 STATED = all_joints(2e9)
-LIMITED_ROBOT = OWN_ROBOT | {
-    "limits": {
-        "q_deg": [
-            [-185.0, 185.0],
-            [-140.0, -5.0],
-            [-120.0, 155.0],
-            [-350.0, 350.0],
-            [-122.5, 122.5],
-            [-350.0, 350.0],
-        ]
-    },
-}
+LIMITED_ROBOT = OWN_ROBOT | {"limits": {"q_deg": LIMITS_DEG}}
 DEEP = "G1 X-20 F3000\nZ-8\nX100 F1500"
 SHALLOW = "G1 X-20 F3000\nZ-.3\nX100 F600"
 
@@ -87,79 +63,69 @@ CASES = {
         {"cut": "G1 Z-1 F300\nS18000\nX70 F8000"},
     ),
     "chip-thin": case({"cut": "G1 Z-1 F300\nS18000\nX70 F50"}, {"cut": "G1 Z-1 F600\nS18000\nX70 F3000"}),
-    "deflection-high": case(
-        {"cut": DEEP, **machine(material={"linear_edge": STEEL})}, {"cut": SHALLOW}, then="payload"
-    ),
+    "deflection-high": case({"cut": DEEP, "material.linear_edge": STEEL}, {"cut": SHALLOW}, then="payload"),
     "depth-limit": case(
-        {"cut": DEEP, **tool(max_depth_mm=3.0)}, {"cut": "G1 Z-2 F300\nX70 F900\nX10\nZ-4 F300\nX70 F900"}
+        {"cut": DEEP, "tool.1.max_depth_mm": 3.0}, {"cut": "G1 Z-2 F300\nX70 F900\nX10\nZ-4 F300\nX70 F900"}
     ),
     "drill-sideways": case(
-        {**tool(kind="drill", teeth=2), "cut": DEEP}, tool(kind="flat"), {"cut": "G1 Z-8 F300"}
+        {"tool.1.kind": "drill", "tool.1.teeth": 2, "cut": DEEP},
+        {"tool.1.kind": "flat"},
+        {"cut": "G1 Z-8 F300"},
     ),
     "feed-per-tooth": case(
         {"head": ("S8000", "S80"), "cut": "G1 Z-1 F300\nX70 F1500"}, {"head": ("S80 ", "S8000 ")}
     ),
     "force-absurd": case(
         {
-            **machine(material={"linear_edge": STEEL | {"Ktc": 29000.0, "Kte": 1900.0}}),
+            "material.linear_edge": STEEL | {"Ktc": 29000.0, "Kte": 1900.0},
             "head": ("S8000", "S80"),
             "cut": DEEP,
         },
-        {**machine(material={"linear_edge": LIGHT}), "head": ("S80 ", "S8000 ")},
+        {"material.linear_edge": LIGHT, "head": ("S80 ", "S8000 ")},
     ),
-    "force-high": case(
-        {"cut": DEEP, **machine(limits={"force_N": 40.0})},
-        {"cut": SHALLOW},
-        machine(limits={"force_N": 9000.0}),
-    ),
-    "force-limit": case({"cut": DEEP, **tool(max_force_N=40.0)}, {"cut": SHALLOW}),
+    "force-high": case({"cut": DEEP, "limits.force_N": 40.0}, {"cut": SHALLOW}, {"limits.force_N": 9000.0}),
+    "force-limit": case({"cut": DEEP, "tool.1.max_force_N": 40.0}, {"cut": SHALLOW}),
     "force-unmeasured": case(
-        {"cut": DEEP, **machine(material={"measured_f_z_mm": [0.1, 0.125]})},
-        {"cut": "G1 X-20 F3000\nZ-8\nX100 F2700"},
+        {"cut": DEEP, "material.measured_f_z_mm": [0.1, 0.125]}, {"cut": "G1 X-20 F3000\nZ-8\nX100 F2700"}
     ),
     "holder-below-top": case(
+        {"cut": "G1 Z-38 F300\nX70", "stock.box_mm": block(80.0, 40.0, -50.0), "tool.1.length_mm": 36.0},
         {
-            "cut": "G1 Z-38 F300\nX70",
-            "cell.toml": {
-                "stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]},
-                "tool": {"1": {"length_mm": 36.0}},
-            },
+            "tool.1.stick_out_mm": 60.0,
+            "tool.1.holder_diameter_mm": 40.0,
+            "tool.1.length_mm": 120.0,
+            "tool.1.flute_length_mm": 40.0,
         },
-        tool(stick_out_mm=60.0, holder_diameter_mm=40.0, length_mm=120.0, flute_length_mm=40.0),
-        tool(length_mm=120.0),
+        {"tool.1.length_mm": 120.0},
         then="shank-in-stock",
     ),
     "holder-in-stock": case(
         {
             "cut": "G1 Z-30 F300\nX70",
-            "cell.toml": {
-                "stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]},
-                "tool": {"1": {"stick_out_mm": 25.0, "holder_diameter_mm": 40.0, "flute_length_mm": 25.0}},
-            },
+            "stock.box_mm": block(80.0, 40.0, -50.0),
+            "tool.1": {"stick_out_mm": 25.0, "holder_diameter_mm": 40.0, "flute_length_mm": 25.0},
         },
-        tool(stick_out_mm=40.0, flute_length_mm=32.0),
+        {"tool.1.stick_out_mm": 40.0, "tool.1.flute_length_mm": 32.0},
         {"cut": "G1 Z-20 F300\nX70"},
     ),
     "shank-in-stock": case(
         {
             "cut": "G1 Z-40 F300\nX70",
-            "cell.toml": {
-                "stock": {"box_mm": [[0.0, 0.0, -50.0], [80.0, 40.0, 0.0]]},
-                "tool": {"1": {"flute_length_mm": 20.0, "stick_out_mm": 60.0, "holder_diameter_mm": 40.0}},
-            },
+            "stock.box_mm": block(80.0, 40.0, -50.0),
+            "tool.1": {"flute_length_mm": 20.0, "stick_out_mm": 60.0, "holder_diameter_mm": 40.0},
         },
-        tool(flute_length_mm=45.0),
+        {"tool.1.flute_length_mm": 45.0},
         {"cut": "G1 Z-18 F300\nX70"},
     ),
     "payload": case({"head": ("S8000", "S80"), "cut": DEEP}, {"head": ("S80 ", "S8000 ")}),
     "torque-high": case({"head": ("S8000", "S80"), "cut": DEEP}, {"head": ("S80 ", "S8000 ")}),
-    "spindle-power": case({"cut": DEEP, **machine(spindle={"max_power_W": 100.0})}, {"cut": SHALLOW}),
-    "spindle-torque": case({"cut": DEEP, **machine(spindle={"max_torque_Nm": 0.2})}, {"cut": SHALLOW}),
+    "spindle-power": case({"cut": DEEP, "spindle.max_power_W": 100.0}, {"cut": SHALLOW}),
+    "spindle-torque": case({"cut": DEEP, "spindle.max_torque_Nm": 0.2}, {"cut": SHALLOW}),
     "plunge": case(
-        {"cut": "G1 Z-4 F300\nX70", **tool(centre_cutting=False)},
+        {"cut": "G1 Z-4 F300\nX70", "tool.1.centre_cutting": False},
         {"cut": "G1 Z0 F300\nX70 Z-4\nX10"},
         {"cut": "G1 X-20 F300\nZ-4\nX70"},
-        tool(centre_cutting=True),
+        {"tool.1.centre_cutting": True},
     ),
     "plunge-fast": case(
         {"cut": "G1 Z-4 F9000\nX70 F1500"},
@@ -167,40 +133,32 @@ CASES = {
         {"cut": "G1 Z0 F1500\nX70 Z-4\nX10"},
     ),
     "plunge-wide": case(
-        {"cut": "G1 Z-2 F300\nX70", **tool(diameter_mm=50.0)},
+        {"cut": "G1 Z-2 F300\nX70", "tool.1.diameter_mm": 50.0},
         {"cut": "G1 X-40 F300\nZ-2\nX70"},
         {"cut": "G1 Z0 F300\nX70 Z-2"},
-        tool(centre_cutting=True),
+        {"tool.1.centre_cutting": True},
     ),
     "rapid-in-stock": case(
         {"cut": "G1 Z-4 F300\nX60\nG0 X20 Y30"},
         {"cut": "G1 Z-4 F300\nX60\nG0 Z5\nX20 Y30"},
         {"cut": "G1 Z-4 F300\nX60\nG1 X20 Y30"},
     ),
-    "stock-guessed": case(
-        {"cell.toml": {"stock": None}}, stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]])
-    ),
+    "stock-guessed": case({"stock": None}, {"stock.box_mm": block(80.0, 40.0)}),
     "stock-large": case(
-        {
-            "cell.toml": {
-                "stock": {"box_mm": [[0.0, 0.0, -10.0], [5000.0, 5000.0, 0.0]], "resolution_mm": None},
-                "tool": {"1": {"diameter_mm": 0.5}},
-            }
-        },
-        stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]),
-        stock(resolution_mm=2.0),
+        {"stock.box_mm": block(5000.0, 5000.0), "stock.resolution_mm": None, "tool.1.diameter_mm": 0.5},
+        {"stock.box_mm": block(80.0, 40.0)},
+        {"stock.resolution_mm": 2.0},
     ),
     "stock-resolution": case(
-        {**stock(resolution_mm=0.01, box_mm=[[0.0, 0.0, -10.0], [400.0, 400.0, 0.0]])},
-        stock(resolution_mm=1.0),
-        stock(box_mm=[[9.0, 9.0, -10.0], [20.0, 20.0, 0.0]]),
+        {"stock.resolution_mm": 0.01, "stock.box_mm": block(400.0, 400.0)},
+        {"stock.resolution_mm": 1.0},
+        {"stock.box_mm": [[9.0, 9.0, -10.0], [20.0, 20.0, 0.0]]},
     ),
     "stock-underside": case(
-        {"cut": "G1 Z-10.4 F300\nX70"}, {"cut": "G1 Z-9 F300\nX70"}, stock(through_mm=0.5)
+        {"cut": "G1 Z-10.4 F300\nX70"}, {"cut": "G1 Z-9 F300\nX70"}, {"stock.through_mm": 0.5}
     ),
     "stock-untouched": case(
-        stock(box_mm=[[200.0, 200.0, -10.0], [280.0, 240.0, 0.0]]),
-        stock(box_mm=[[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]),
+        {"stock.box_mm": [[200.0, 200.0, -10.0], [280.0, 240.0, 0.0]]}, {"stock.box_mm": block(80.0, 40.0)}
     ),
     "no-deflection": case(
         {"words": WET + " --compensate offline --no-forces"},
@@ -208,35 +166,35 @@ CASES = {
         then=("compensation-unsure", "compensation-large"),
     ),
     "compensation-twice": case(
-        {
-            "words": WET + " --compensate offline --online RSI",
-            **machine(online={"link": {"address": "192.168.7.3"}}),
-        },
+        {"words": WET + " --compensate offline --online RSI", "online.link.address": "192.168.7.3"},
         {"words": WET + " --online RSI"},
         {"words": WET + " --compensate offline"},
         then=("compensation-unsure", "compensation-large"),
     ),
     "compensation-unsure": case(
         {"words": WET + " --compensate offline", "cut": SHALLOW},
-        machine(
-            compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED},
-            material={"sure": "verified", "source": "a slot", "relative_band": 0.05},
-        ),
+        {
+            "compliance.sensor_height_mm": 56.0,
+            "compliance.virtual_joints": STATED,
+            "material.sure": "verified",
+            "material.source": "a slot",
+            "material.relative_band": 0.05,
+        },
     ),
-    "stiffness-estimated": case({}, machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED})),
+    "stiffness-estimated": case(
+        {}, {"compliance.sensor_height_mm": 56.0, "compliance.virtual_joints": STATED}
+    ),
     "stiffness-unknown": case(
-        {"cell.toml": {"robot": LIMITED_ROBOT}},
-        {"cell.toml": {"robot": {"payload": {"mass_kg": 120.0, "reach_mm": 2701.0}}}},
+        {"robot": LIMITED_ROBOT}, {"robot.payload.mass_kg": 120.0, "robot.payload.reach_mm": 2701.0}
     ),
     "near-mode": case(
-        {"head": ("S8000", "S1200"), "cut": "G1 Z-1 F100\nX70", **machine(compliance={"modes_hz": [20.0]})},
+        {"head": ("S8000", "S1200"), "cut": "G1 Z-1 F100\nX70", "compliance.modes_hz": [20.0]},
         {"head": ("S1200", "S1500")},
     ),
     # going on in the middle
     "restart-line": case({"words": WET + " --from-line 3"}, {"words": WET + " --from-line 7"}),
     "restart-stock-unknown": case(
-        {"words": WET + " --from-line 8", "cell.toml": {"material": None}},
-        {"cell.toml": {"material": {"model": "AW-2017A"}}},
+        {"words": WET + " --from-line 8", "material": None}, {"material.model": "AW-2017A"}
     ),
     "restart-in-stock": case(
         {"words": WET + " --from-line 11", "cut": "G64 P3\nG1 Z-5 F300\nX60 F600\nY30\nX20"},
@@ -250,69 +208,46 @@ CASES = {
         {
             "words": WET.replace("--pilot none", "--pilot index"),
             "cut": "G1 Z0.5 F300\nZ-1\nG2 X50 Y10 I20",
-            **machine(controller={"circ": True}),
+            "controller.circ": True,
         },
-        machine(controller={"circ": False}),
+        {"controller.circ": False},
         {"words": WET},
     ),
     "deflection-absurd": case(
-        {
-            "cut": DEEP,
-            **machine(
-                compliance={
-                    "sensor_height_mm": 56.0,
-                    "virtual_joints": all_joints(1e6),
-                }
-            ),
-        },
-        machine(compliance={"virtual_joints": STATED}),
+        {"cut": DEEP, "compliance.sensor_height_mm": 56.0, "compliance.virtual_joints": all_joints(1e6)},
+        {"compliance.virtual_joints": STATED},
     ),
     "effect-weightless": case(
         {
             "words": PREDICT + " --effect gear_twist:target=A2,deg_per_kNm=0.01",
-            **machine(
-                robot={"model": "KR 60 HA"},
-                frames={"base": {"x_mm": 1300.0, "z_mm": 500.0}},
-                load={"mass_kg": 24.0},
-            ),
+            "robot.model": "KR 60 HA",
+            "frames.base.x_mm": 1300.0,
+            "frames.base.z_mm": 500.0,
+            "load.mass_kg": 24.0,
         },
-        machine(robot={"drives": {"link_mass_kg": [100.0, 80.0, 60.0, 20.0, 10.0, 3.0]}}),
+        {"robot.drives.link_mass_kg": [100.0, 80.0, 60.0, 20.0, 10.0, 3.0]},
     ),
     "lobes": case(
         {
             "cut": DEEP,
-            **machine(
-                compliance={
-                    "tap_modes": [
-                        {
-                            "tool": 1,
-                            "direction": x,
-                            "frequency_hz": 600.0,
-                            "damping": 0.02,
-                            "stiffness_N_mm": 300.0,
-                        }
-                        for x in "xy"
-                    ]
-                }
-            ),
+            "compliance.tap_modes": [
+                {"tool": 1, "direction": x, "frequency_hz": 600.0, "damping": 0.02, "stiffness_N_mm": 300.0}
+                for x in "xy"
+            ],
         },
         {"cut": SHALLOW},
     ),
     "mode-coupling": case(
         {
             "cut": "G1 X-20 F3000\nZ-8\nX100 F1500",
-            **machine(
-                material={
-                    "linear_edge": {
-                        "Ktc": 1500.0,
-                        "Krc": 600.0,
-                        "Kac": 300.0,
-                        "Kte": 20.0,
-                        "Kre": 20.0,
-                        "Kae": 3.0,
-                    }
-                }
-            ),
+            "material.linear_edge": {
+                "Ktc": 1500.0,
+                "Krc": 600.0,
+                "Kac": 300.0,
+                "Kte": 20.0,
+                "Kre": 20.0,
+                "Kae": 3.0,
+            },
         },
         {"cut": SHALLOW},
         then="payload",
@@ -322,25 +257,20 @@ CASES = {
             "words": WET + " --job job.toml",
             "job.toml": '[stock]\nmesh = "box.stl"\n',
             "box.stl": BOX,
-            **machine(work_offsets={"G54": ZERO | {"x_mm": 5.0}}),
+            "work_offsets.G54": ZERO | {"x_mm": 5.0},
         },
-        machine(work_offsets={"G54": ZERO}),
-        {"job.toml": "", **machine(stock={"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]})},
+        {"work_offsets.G54": ZERO},
+        {"job.toml": "", "stock.box_mm": block(80.0, 40.0)},
     ),
-    "stock-mesh": case(
-        {"box.stl": OPEN, "cell.toml": {"stock": {"mesh": "box.stl", "box_mm": None}}},
-        {"box.stl": BOX},
-    ),
-    "stock-unit": case(
-        {"box.stl": SMALL, "cell.toml": {"stock": {"mesh": "box.stl", "box_mm": None}}},
-        {"box.stl": BOX},
-    ),
+    "stock-mesh": case({"box.stl": OPEN, "stock.mesh": "box.stl", "stock.box_mm": None}, {"box.stl": BOX}),
+    "stock-unit": case({"box.stl": SMALL, "stock.mesh": "box.stl", "stock.box_mm": None}, {"box.stl": BOX}),
     "nominal-gouge": case(
         {
             "words": PREDICT + " --nominal part.stl",
             "part.stl": BOX,
             "cut": DEEP,
-            "cell.toml": {"stock": {"box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]], "resolution_mm": 0.5}},
+            "stock.box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]],
+            "stock.resolution_mm": 0.5,
         },
         {"cut": "G1 X-20 F3000\nZ-.05\nX100"},
         {"part.stl": LOWER},
@@ -350,7 +280,8 @@ CASES = {
             "words": PREDICT + " --nominal part.stl",
             "part.stl": LOWER,
             "cut": SHALLOW,
-            "cell.toml": {"stock": {"box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]], "resolution_mm": 0.5}},
+            "stock.box_mm": [[0.0, 2.0, -10.0], [80.0, 18.0, 0.0]],
+            "stock.resolution_mm": 0.5,
         },
         {"cut": DEEP},
     ),
@@ -365,39 +296,34 @@ CASES = {
     ),
     "restart-arm": case(
         {
-            "cell.toml": {"frames": {"spin": "auto"}},
+            "frames.spin": "auto",
             "words": WET + " --from-line 10",
             "head": ("X10 Y10", "X-700 Y0"),
             "cut": "G1 Z-1 F300\nX-690\nG0 Z5\nX-20 Y10\nG1 Z-1 F300\nX60 F600",
         },
-        {"cell.toml": {"frames": {"spin": 90.0}}},
+        {"frames.spin": 90.0},
     ),
     "compensation-large": case(
         {
             "words": WET + " --compensate offline",
             "cut": DEEP,
-            **machine(
-                compliance={
-                    "sensor_height_mm": 56.0,
-                    "virtual_joints": all_joints(3e7),
-                },
-                material=MEASURED,
-            ),
+            "compliance.sensor_height_mm": 56.0,
+            "compliance.virtual_joints": all_joints(3e7),
+            "material": MEASURED,
         },
-        machine(compliance={"virtual_joints": STATED}),
-        {"cut": SHALLOW, **machine(compliance={"virtual_joints": STATED})},
+        {"compliance.virtual_joints": STATED},
+        {"cut": SHALLOW, "compliance.virtual_joints": STATED},
         then="compensation-unsettled",
     ),
     "axis-turns": case(
         {
             "words": WET + " --compensate offline",
             "cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG1 A20\nG1 X40\nG0 Z80\nA0",
-            **machine(
-                compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED},
-                material=MEASURED,
-                controller={"vel_ori_deg_s": 10.0},
-                **FIVE,
-            ),
+            "compliance.sensor_height_mm": 56.0,
+            "compliance.virtual_joints": STATED,
+            "material": MEASURED,
+            "controller.vel_ori_deg_s": 10.0,
+            **FIVE,
         },
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG1 X40 A20\nG0 Z80\nA0"},
         {"cut": A + "G0 A0 C0\nG1 X20 Y10 Z-1 F600\nG0 Z80\nA20\nG1 Z-1 F600\nG1 X40\nG0 Z80\nA0"},
@@ -407,13 +333,12 @@ CASES = {
         {
             "words": WET + " --compensate offline",
             "cut": "G1 Z-1 F300\nX60 F600",
-            **machine(compliance={"sensor_height_mm": 56.0, "virtual_joints": STATED}, material=MEASURED),
+            "compliance.sensor_height_mm": 56.0,
+            "compliance.virtual_joints": STATED,
+            "material": MEASURED,
         },
         {"cut": "G1 X-20 F3000\nZ-1\nX100 F600"},
     ),
     "force-input": case({"words": "call force -1"}, {"words": "call force 1"}),
-    "material-missing": case(
-        {"words": "call cut_of", "cell.toml": {"material": None}},
-        {"cell.toml": {"material": {"model": "AW-2017A"}}},
-    ),
+    "material-missing": case({"words": "call cut_of", "material": None}, {"material.model": "AW-2017A"}),
 }

@@ -2,14 +2,14 @@
 
 import re
 
-from tests.remedies.bench import BASE, DRY, GONE, VERIFY, WET, case, laid
+from tests.remedies.bench import BASE, DRY, GONE, VERIFY, WET, block, case, laid
 
 STATE = laid(BASE, {"words": f"{DRY}; change; {VERIFY}"})
 SPLIT = f"{DRY} --split files --max-lines 100"
 LIN = "LIN {X 30.000,Y 10.000,Z -1.000,A 0.0000,B 0.0000,C 0.0000}\r\n"
 CARRIED = WET.replace("--pilot none", "--pilot index")
 ONLINE = WET.replace("--pilot none", "--pilot none --online RSI")
-METAL = {"material": {"model": "AW-2017A"}, "stock": {"box_mm": [[0.0, 0.0, -10.0], [40.0, 20.0, 0.0]]}}
+METAL = {"material": {"model": "AW-2017A"}, "stock": {"box_mm": block(40.0, 20.0)}}
 LINK = {"online": {"link": {"address": "192.168.7.3"}}}
 RAIL = {
     "kind": "rail",
@@ -49,9 +49,7 @@ def online(file, old, new):
 
 def templated(key, value, *remedies):
     """Return the case of a statement of the cell's templates."""
-    return case(
-        {"words": DRY, "cell.toml": {"m_code": {key: value}}, "cut": f"{key}\nG1 Z-1 F300\nX30"}, *remedies
-    )
+    return case({"words": DRY, "m_code": {key: value}, "cut": f"{key}\nG1 Z-1 F300\nX30"}, *remedies)
 
 
 CASES = {
@@ -77,10 +75,8 @@ CASES = {
             )
         }
     ),
-    "verify-external": again(
-        {"out.src": ("E1 0.000", "E1 9.000")}, **{"cell.toml": {"external": {"E1": RAIL}}}
-    ),
-    "krl-external": again({"out.src": (",E1 0.000", "")}, **{"cell.toml": {"external": {"E1": RAIL}}}),
+    "verify-external": again({"out.src": ("E1 0.000", "E1 9.000")}, **{"external.E1": RAIL}),
+    "krl-external": again({"out.src": (",E1 0.000", "")}, **{"external.E1": RAIL}),
     "krl-blend-broken": src("C_DIS\r\n", "C_DIS\r\n$OUT[5]=TRUE\r\n"),
     "krl-data": again({"out.dat": ("EXT BAS", "EXT BAD")}),
     "krl-first-motion": again({"out.src": lambda text: re.sub(rb"PTP \{[^\r]*\r\n", b"", text, count=2)}),
@@ -107,7 +103,7 @@ CASES = {
         {"words": f"{DRY}; verify part.nc part.nc --cell cell.toml"}, {"words": f"{DRY}; {VERIFY}"}
     ),
     "krl-call-undeclared": src(LIN, LIN + "GRIPPER(1)\r\n"),
-    "krl-line-too-long": templated("M10", "; " + "x" * 600, {"cell.toml": {"m_code": {"M10": "; x"}}}),
+    "krl-line-too-long": templated("M10", "; " + "x" * 600, {"m_code.M10": "; x"}),
     "krl-unknown": src(LIN, LIN + "SWITCHON 5\r\n"),
     "krl-name": case(
         {"words": DRY.replace("out.src", "circ.src")}, {"words": DRY.replace("out.src", "circ_1.src")}

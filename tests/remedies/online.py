@@ -10,7 +10,7 @@ from tests.krl.forces import moved, with_forces
 from tests.krl.test_pilot_program import FOOT, HEAD, noisy, predicted, sawtooth
 from tests.online.test_cli import STOCK
 from tests.online.test_twin import SLOT
-from tests.remedies.bench import BASE, WET, call, case, laid
+from tests.remedies.bench import BASE, WET, block, call, case, laid
 from tests.remedies.cutting import STATED
 from tests.remedies.krl import CARRIED_CUT, LINK, METAL, ONLINE
 
@@ -71,27 +71,25 @@ def words(text):
 
 CASES = {
     # switching it in the program
-    "online-tool": case({"tail": MORE, "cell.toml": {"m_code": {"M6": "HALT"}}}, {"tail": BASE["tail"]}),
+    "online-tool": case({"tail": MORE, "m_code.M6": "HALT"}, {"tail": BASE["tail"]}),
     "online-home": case(
         {"cut": AGAIN.format("G28 X0 Y0")}, {"cut": AGAIN.format("G28 Z0")}, {"cut": CARRIED_CUT}
     ),
     "online-halt": case({"cut": AGAIN.format("M0")}, {"cut": AGAIN.format("")}, {"cut": CARRIED_CUT}),
     "online-nothing": case({"head": ("Z20\n", "Z150\n"), "cut": "", "tail": "M5\nM30\n"}, words(WET)),
     "online-pilot": case(
-        {
-            **words(ONLINE.replace("--pilot none", "--pilot index")),
-            "cell.toml": {"pilot": {"index_variable": "MY_INDEX"}},
-        },
-        {"cell.toml": {"pilot": {"index_variable": "$SEN_PINT[1]"}}},
+        {**words(ONLINE.replace("--pilot none", "--pilot index")), "pilot.index_variable": "MY_INDEX"},
+        {"pilot.index_variable": "$SEN_PINT[1]"},
         words(ONLINE),
     ),
-    "online-address": case({"cell.toml": {"online": None}}, {"cell.toml": LINK}),
+    "online-address": case({"online": None}, {"cell.toml": LINK}),
     "rsi-index": case(
         {
             **words(ONLINE.replace("--pilot none", "--pilot index")),
-            "cell.toml": {"pilot": {"index_variable": "$SEN_PINT[21]"}, "controller": {"rsi": "3"}},
+            "pilot.index_variable": "$SEN_PINT[21]",
+            "controller.rsi": "3",
         },
-        {"cell.toml": {"pilot": {"index_variable": "$SEN_PINT[3]"}}},
+        {"pilot.index_variable": "$SEN_PINT[3]"},
     ),
     # the pilot force
     "pilot-dense": case(
@@ -116,12 +114,12 @@ CASES = {
             **words(SIMULATE),
             "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -30.0], [80.0, 40.0, -20.0]]}},
         },
-        {"cell.toml": {"stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}}},
+        {"stock.box_mm": block(80.0, 40.0)},
     ),
     "pilot-refused": case(
         {
             **words(SIMULATE + " --feed-scale 0.5"),
-            "cell.toml": {**KNOWN, "stock": {"box_mm": [[0.0, 0.0, -10.0], [80.0, 40.0, 0.0]]}},
+            "cell.toml": {**KNOWN, "stock": {"box_mm": block(80.0, 40.0)}},
         },
         words(SIMULATE),
     ),

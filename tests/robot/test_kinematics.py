@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-import py_opw_kinematics as opw
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,6 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from gcode2krl.robot.inverse_kinematics import all_branches, one_branch
 from gcode2krl.robot.kinematics import flange_pose, status_turn
 from gcode2krl.robot.velocity_kinematics import jacobian, smallest_singular_value
+from tests.krl.replay import opw_solver
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -140,19 +140,7 @@ class TestAllBranches:
         n = 3_000
         position, rotation = flange_pose(random_angles(n, seed=1), geometry)
         mine = all_branches(position, rotation, geometry)
-        a1, a2, c1, c2, c3, c4 = geometry
-        model = opw.KinematicModel(
-            a1=a1,
-            a2=a2,
-            b=0.0,
-            c1=c1,
-            c2=c2,
-            c3=c3,
-            c4=c4,
-            offsets=(0.0, -math.pi / 2, 0.0, 0.0, 0.0, 0.0),
-            flip_axes=(True, False, False, True, False, True),
-        )
-        solver = opw.Robot(model, degrees=False)
+        solver = opw_solver(geometry, degrees=False)
         poses = RigidTransform.from_components(position, Rotation.from_matrix(rotation))
         compared = 0
         for i in range(n):

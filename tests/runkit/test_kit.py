@@ -35,8 +35,7 @@ ASSUMED = re.compile(r"^; ASSUMED, look at this in T1: (.*)$", re.MULTILINE)
 @pytest.fixture
 def program(run, tmp_path):
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
-    done = run("part.nc", "-o", "PART.src")
-    assert done.code == 0, done.err
+    run("part.nc", "-o", "PART.src", code=0)
     return tmp_path / "PART.src"
 
 
@@ -150,12 +149,10 @@ def test_the_check_list_says_what_to_look_at_in_this_program_alone(made):
 def test_a_program_with_rsi_has_a_table_to_compare_with_rsi_visual(run, tmp_path, kss, some):
     (tmp_path / "part.nc").write_text(CLEAN, encoding="ascii")
     (tmp_path / "cell.toml").write_text(f'based_on = "demonstration"\n[controller]\nkss = "{kss}"\n')
-    done = run("part.nc", "-o", "PART.src", "--cell", "cell.toml", "--online", "FLOW")
-    assert done.code == 0, done.err
+    done = run("part.nc", "-o", "PART.src", "--cell", "cell.toml", "--online", "FLOW", code=0)
     suffix = {"8.3": ".rsi.xml", "8.7": ".rsix"}[kss]
     assert f"FLOW{suffix}" in done.out
-    done = run("runkit", "PART.src", "--cell", "cell.toml")
-    assert done.code == 0, done.err
+    run("runkit", "PART.src", "--cell", "cell.toml", code=0)
     page = text_of(tmp_path / "PART_runkit" / "checklist.html")
     header = re.findall(
         r"^; ASSUMED, look at this in T1: (.*)$", text_of(tmp_path / "PART.src"), re.MULTILINE
@@ -218,8 +215,7 @@ def test_frames_by_number_are_listed_with_what_must_stand_in_the_table(run, tmp_
     )
     (tmp_path / "part.nc").write_text(PART, encoding="ascii")
     assert run("part.nc", "-o", "PART.src", "--cell", "cell.toml").code == 0
-    done = run("runkit", "PART.src", "--cell", "cell.toml")
-    assert done.code == 0, done.err
+    run("runkit", "PART.src", "--cell", "cell.toml", code=0)
     page = text_of(tmp_path / "PART_runkit" / "checklist.html")
     assert "BAS (#BASE,3 )" in page
     assert "BASE_DATA[3]={X 1500.000,Y 100.000,Z 800.000,A 10.0000,B 0.0000,C 0.0000}" in page

@@ -67,39 +67,25 @@ def test_missing_values_are_dropped_and_counted(tmp_path):
     assert 6 not in trace.row
 
 
-def test_missing_column(tmp_path):
-    issue = refused(write(tmp_path, rows(), "t_s,x_cmd_mm,y_mm,z_cmd_mm"))
-    assert issue.code == "trace-column"
-    assert "y_cmd_mm: missing" in issue.message
-    assert "y_mm" in issue.message
+def with_row(row, text):
+    return [text if k == row else line for k, line in enumerate(rows())]
 
 
-def test_time_that_falls(tmp_path):
-    lines = rows()
-    lines[8] = "0.010,1,2,3"
-    issue = refused(write(tmp_path, lines))
-    assert (issue.code, issue.line) == ("trace-time", 10)
-    assert "t_s" in issue.message
-
-
-def test_time_in_milliseconds(tmp_path):
-    issue = refused(write(tmp_path, [f"{12 * i},1,2,3" for i in range(20)]))
-    assert issue.code == "trace-unit"
-    assert "t_s" in issue.message
-
-
-def test_not_a_number(tmp_path):
-    lines = rows()
-    lines[5] = "0.060,1,#ERR,3"
-    issue = refused(write(tmp_path, lines))
-    assert (issue.code, issue.line) == ("trace-number", 7)
-    assert "y_cmd_mm" in issue.message
-
-
-def test_too_few_rows(tmp_path):
-    issue = refused(write(tmp_path, rows(9)))
-    assert issue.code == "trace-short"
-    assert "9 usable rows" in issue.message
+@pytest.mark.parametrize(
+    ("lines", "header", "place", "words"),
+    [
+        (rows(), "t_s,x_cmd_mm,y_mm,z_cmd_mm", ("trace-column", 1), ["y_cmd_mm: missing", "y_mm"]),
+        (with_row(8, "0.010,1,2,3"), HEADER, ("trace-time", 10), ["t_s"]),
+        ([f"{12 * i},1,2,3" for i in range(20)], HEADER, ("trace-unit", 3), ["t_s"]),
+        (with_row(5, "0.060,1,#ERR,3"), HEADER, ("trace-number", 7), ["y_cmd_mm"]),
+        (rows(9), HEADER, ("trace-short", 0), ["9 usable rows"]),
+    ],
+    ids=["a missing column", "time that falls", "time in ms", "no number", "too few rows"],
+)
+def test_a_wrong_table_is_named_with_its_place(tmp_path, lines, header, place, words):
+    issue = refused(write(tmp_path, lines, header))
+    assert (issue.code, issue.line) == place
+    assert [word for word in words if word not in issue.message] == []
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\xfe\x01", b"PAR1 and then nothing"])

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gcode2krl.runs import matching
+from gcode2krl.runs.matching import _shares, explained
 
 
 def signals(seed, columns=3):
@@ -118,3 +119,31 @@ def test_nearest_against_every_distance():
     every = np.linalg.norm(points[:, None] - others[None], axis=2)
     assert np.array_equal(index, every.argmin(axis=1))
     assert np.allclose(far, every.min(axis=1))
+
+
+GENERATOR = np.random.default_rng(1)
+REFERENCE = np.cumsum(GENERATOR.standard_normal((200, 3)), axis=0)
+MEASURED = np.cumsum(GENERATOR.standard_normal((260, 2)), axis=0)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_shares_are_those_of_the_chosen_rows(every):
+    inside = (np.arange(260) >= 30) & (np.arange(260) < 240)
+    found = _shares(REFERENCE, MEASURED, inside, every, least=175)
+    for step, share in enumerate(found):
+        both = np.flatnonzero(inside[step : step + 200])
+        if len(both) < 175:
+            assert share == -1.0
+            continue
+        chosen = both[::every]
+        assert share == pytest.approx(explained(REFERENCE[chosen], MEASURED[step + chosen]), abs=1e-9)
+    assert np.any(found == -1.0)
+    assert np.any(found > 0.0)
+
+
+def test_what_stands_still_is_explained_by_nothing():
+    still = np.zeros((260, 2))
+    still[:100] = 0.3
+    found = _shares(REFERENCE[:50], still, np.ones(260, dtype=bool), 1, least=10)
+    assert found[0] == 0.0
+    assert found[80] > 0.0

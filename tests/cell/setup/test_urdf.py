@@ -120,14 +120,12 @@ def test_an_arm_of_no_library_becomes_a_cell_and_a_program(run, tmp_path):
     answers = (ROOT / "examples/cells/answers/change_by_hand.toml").read_text(encoding="utf-8")
     stated = [line for line in answers.splitlines() if not line.startswith(("robot =", "limits_deg"))]
     (tmp_path / "answers.toml").write_text("\n".join(stated), encoding="utf-8")
-    made = run("init", "cell.toml", "--controller", "arm_macro.xacro", "--answers", "answers.toml")
-    assert made.code == 0, made.err
+    run("init", "cell.toml", "--controller", "arm_macro.xacro", "--answers", "answers.toml", code=0)
     cell = (tmp_path / "cell.toml").read_text(encoding="utf-8")
     assert "c3_mm = 2020" in cell
     assert "arm_macro.xacro, its joints" in cell
     (tmp_path / "part.nc").write_text(GOOD.format(x=50), encoding="ascii")
-    written = run("part.nc", "--cell", "cell.toml", "-o", "PART.src")
-    assert written.code == 0, written.err
+    run("part.nc", "--cell", "cell.toml", "-o", "PART.src", code=0)
 
 
 @pytest.mark.parametrize(

@@ -26,11 +26,6 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def prediction():
-    return predict(PIECE, load_cell())
-
-
-@pytest.fixture(scope="module")
 def file(prediction, tmp_path_factory):
     made = tmp_path_factory.mktemp("page") / "test piece.html"
     write_page(content_of(prediction, text=PIECE.read_text(encoding="ascii")), made)

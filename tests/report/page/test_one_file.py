@@ -27,11 +27,6 @@ PIECE = ROOT / "examples" / "test_piece.nc"
 
 
 @pytest.fixture(scope="module")
-def prediction():
-    return predict(PIECE, load_cell())
-
-
-@pytest.fixture(scope="module")
 def text(prediction):
     return page(content_of(prediction, text=PIECE.read_text(encoding="ascii")))
 
