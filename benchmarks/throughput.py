@@ -5,8 +5,9 @@ Every figure is a whole process, start-up included, unless the table says otherw
 meets is ``translate, as typed``: the command of the README with the built-in cell. It is typed for two
 rasters: that of the README with a ball of 8 mm, and one of a flat mill of 16 mm on a part of 140 x 74 mm.
 Processor time stands beside the wall's, which rewards overlap too; it is the measure on a machine that does
-something else as well. Last comes how fast FreeCAD's path simulator, which predicts no forces, removes the
-same moves from cells of the same size as the cutting here. Nothing is judged: the figures are printed.
+something else as well. Last comes what the removal does: cells looked at for each that is lowered (counted
+by the checked build), how fast, and how fast FreeCAD's path simulator, which predicts no forces, removes the
+same moves from cells of the same size. Nothing is judged here: the figures are printed.
 
     python benchmarks/throughput.py                               a million lines, all peers, 3 rounds
     python benchmarks/throughput.py --lines 100000 --peers rs274  smaller, the yardstick only
@@ -29,7 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +40,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "examples"))
 
 from make_raster import Raster, raster_program  # noqa: E402
+from throughput_kinds import Kind, write_kinds  # noqa: E402
 
 import gcode2krl  # noqa: E402
 
@@ -52,9 +54,10 @@ PYGCODE_LINES = 20_000
 WARM_UP_LINES = 2_000
 CYCLE_S = 0.012
 CELL_LINES = 30_000
-"""Lines of the parts that FreeCAD cuts."""
+"""Lines of the parts whose cells are counted: the build that counts is slow."""
 SMALLEST_SCALE = 10_000
 KIND_LINES = 200_000
+HAS_MOTION = "plan_motion" in gcode2krl.__all__
 
 READ = "from gcode2krl import read_gcode; read_gcode({part!r})"
 CHAIN = """
@@ -105,12 +108,17 @@ class Run(NamedTuple):
     problem: str
 
 
-def run(command: Sequence[str], folder: Path) -> Run:
-    """Run a process to its end: its times and its own peak memory."""
+def run(command: Sequence[str], folder: Path, more: dict[str, str] | None = None) -> Run:
+    """Run a process to its end, with ``more`` in its environment: its times and its own peak memory."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         start = time.perf_counter()
         process = subprocess.Popen(
-            command, cwd=folder, env=environment(folder), stdout=out, stderr=err, stdin=subprocess.DEVNULL
+            command,
+            cwd=folder,
+            env=environment(folder) | (more or {}),
+            stdout=out,
+            stderr=err,
+            stdin=subprocess.DEVNULL,
         )
         _, status, used = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - start
@@ -232,89 +240,6 @@ def write_inputs(folder: Path) -> None:
     (folder / "look_ahead.toml").write_text('based_on = "demonstration"\n', encoding="ascii")
 
 
-# --- programs of other kinds than a raster ---------------------------------------------------------
-
-BLOCKS_OF_A_TURN = 5
-"""Blocks that the loop of `macro_lines` runs in a turn, its while and endwhile not counted."""
-
-
-class Kind(NamedTuple):
-    """A program of a kind."""
-
-    name: str
-    part: Path
-    cell: str
-    """Cell that reading it takes, '' = none."""
-    is_plain: bool
-    """It has no parameters, so that parsers of words can be compared."""
-
-
-def write_kinds(folder: Path, lines: int, five_axes: Path) -> tuple[Kind, ...]:
-    """Write the programs; ``five_axes`` is a raster with rotary words of so many lines."""
-    arcs, macro = folder / f"arcs_{lines}.nc", folder / f"macro_{lines}.ngc"
-    for part, made in ((arcs, arc_lines(lines)), (macro, macro_lines(lines))):
-        with part.open("w", encoding="ascii", newline="\n") as file:
-            file.writelines(f"{line}\n" for line in made)
-    return (
-        Kind(f"{lines:,} lines with arcs and modal words", arcs, "", is_plain=True),
-        Kind(f"{lines:,} executed blocks of a loop with expressions", macro, "", is_plain=False),
-        Kind(f"{lines:,} lines with A and C in every block", five_axes, "five_axes.toml", is_plain=True),
-    )
-
-
-def arc_lines(lines: int) -> Iterator[str]:
-    """Yield straight moves, arcs by centre and by radius, helices, modes, numbers and comments."""
-    yield from ("G21 G90 G17 G94 F900", "G0 X0 Y0 Z5", "G1 Z-1")
-    x, number = 0.0, 3
-    while number < lines - 1:
-        at = number % 12
-        if at in (0, 4):
-            yield (
-                f"N{number} G3 X{x + 2:.3f} Y1. I1. J0. F{900 + at}"
-                if at
-                else f"N{number} G1 X{x:.3f} Y1. F1200."
-            )
-            x += 2.0 if at else 0.0
-        elif at in (1, 2):
-            x += 1.0
-            yield f"X{x:.3f} Y{1 if at == 2 else 2}."
-        elif at == 3:
-            yield f"G0 X{x:.3f} Y1."
-        elif at == 5:
-            x += 3.0
-            yield f"G2 X{x:.3f} Y1. R1.6"
-        elif at == 6:
-            yield "G91 G1 Z-0.01"
-        elif at == 7:
-            yield "G90"
-        elif at == 8:
-            yield f"G3 X{x:.3f} Y1. Z{-1 - 0.001 * (number % 900):.3f} I-2. J0."
-        elif at == 9:
-            yield f"(PASS {number})"
-        elif at == 10:
-            yield f"G18 G1 X{x:.3f} Z-1. F{800 + number % 7}"
-        else:
-            yield "G17 M8"
-        x = math.fmod(x, 500.0) if at == 11 else x
-        number += 1
-    yield "M2"
-
-
-def macro_lines(blocks: int) -> Iterator[str]:
-    """Yield a program whose loop runs so many blocks."""
-    turns = blocks // BLOCKS_OF_A_TURN
-    yield from ("G21 G90 G17 G94 F900", "G0 X0 Y0 Z5", "#1 = 0 #<radius> = 40", f"O100 while [#1 LT {turns}]")
-    yield from (
-        "#2 = [#1 * 0.37]",
-        "G1 X[#<radius> * COS[#2]] Y[#<radius> * SIN[#2]] F[800 + #1 MOD 7]",
-        "#3 = [ROUND[#2] / 1000 + 0.5]",
-        "Z-#3",
-        "#1 = [#1 + 1]",
-        "O100 endwhile",
-        "M2",
-    )
-
-
 # --- the work: peers -------------------------------------------------------------------------------
 
 
@@ -387,7 +312,7 @@ def translate(part: Path, out: str) -> list[str]:
 
 
 def our_work(part: Path, lines: int) -> list[Work]:
-    """Return reading, translating and the chain with the time law."""
+    """Return reading, translating and, where it exists, the chain with the time law."""
     out = str(part.with_name("out.src"))
     read = [sys.executable, "-c", READ.format(part=str(part))]
     flat = make_flat_raster(part.parent, lines)
@@ -403,12 +328,11 @@ def our_work(part: Path, lines: int) -> list[Work]:
             [sys.executable, "-c", READ_FIVE_AXES.format(part=str(turned))],
         )
     )
-    work += [
-        chain_work("read, 12 ms plan, joints, KRL verified", part, "unlimited.toml", 0.6),
-        chain_work("the same with compliance", part, "unlimited.toml", 0.7, COMPLIANCE),
-        chain_work("whole chain, material at 0.25 mm cells", part, "material.toml", 1.8, WHOLE),
-        chain_work("12 ms plan, joints, with look-ahead on", part, "look_ahead.toml"),
-    ]
+    if HAS_MOTION:
+        work.append(chain_work("read, 12 ms plan, joints, KRL verified", part, "unlimited.toml", 0.6))
+        work.append(chain_work("the same with compliance", part, "unlimited.toml", 0.7, COMPLIANCE))
+        work.append(chain_work("whole chain, material at 0.25 mm cells", part, "material.toml", 1.8, WHOLE))
+        work.append(chain_work("12 ms plan, joints, with look-ahead on", part, "look_ahead.toml"))
     return work
 
 
@@ -418,45 +342,136 @@ def warm_up(folder: Path) -> None:
         work.repeat(folder)
 
 
-# --- removal beside FreeCAD's (a child process runs ours) -------------------------------------------
+# --- stage by stage (a child process runs this) ----------------------------------------------------
 
 
-def cutting_of(part: str) -> tuple[float, float]:
-    """Cut a part in this process; return the processor time of removal and reading, and a cell's size."""
-    from gcode2krl.cutting import engagement, milling
+def stages(part: str, cell_path: str, out: str) -> list[tuple[str, float, int]]:
+    """Return (stage, seconds, rows it made) of one chain in this process."""
+    cell = gcode2krl.load_cell(cell_path)
+    times: list[tuple[str, float, int]] = []
 
-    seconds, cut_strip = [], engagement.cut_strip
+    def timed(name: str, stage: Callable, *arguments: object, **options: object) -> object:
+        start = time.perf_counter()
+        made = stage(*arguments, **options)
+        times.append((name, time.perf_counter() - start, len(made) if hasattr(made, "__len__") else 0))
+        return made
+
+    toolpath = timed("read_gcode", gcode2krl.read_gcode, part, cell)
+    targets = timed("set_targets", gcode2krl.set_targets, toolpath, cell)
+    followed = targets
+    if HAS_MOTION:
+        followed = timed("plan_motion", gcode2krl.plan_motion, targets, cell, dt_s=CYCLE_S)
+    timed("solve_joints", gcode2krl.solve_joints, followed, cell)
+    timed("write_krl", gcode2krl.write_krl, targets, out, cell)
+    return times
+
+
+def run_stages(part: str, folder: Path) -> None:
+    """Print the stages as JSON, once everything is imported."""
+    out = str(folder / "stages.src")
+    stages(str(folder / f"raster_{WARM_UP_LINES}.nc"), "unlimited.toml", out)
+    print(json.dumps(stages(part, "unlimited.toml", out)))
+
+
+def print_stages(part: Path, lines: int, folder: Path) -> None:
+    once = run([sys.executable, str(Path(__file__).resolve()), "--stages-of", str(part)], folder)
+    print("\nstage by stage, one process, all imported, look-ahead unlimited; write_krl verifies too")
+    if once.problem:
+        print(f"  {once.problem}")
+        return
+    print(f"  {'':<14}{'s':>8}{'lines/s':>14}{'rows':>13}")
+    table = json.loads(once.output)
+    table.append(("together", sum(seconds for _, seconds, _ in table), 0))
+    for name, seconds, rows in table:
+        print(f"  {name:<14}{seconds:8.2f}{lines / seconds:14,.0f}{f'{rows:,}' if rows else '':>13}")
+
+
+# --- removal, cell by cell (a child process runs this) ---------------------------------------------
+
+
+class Cells(NamedTuple):
+    """What the removal of a part does."""
+
+    looked_at: int
+    lowered: int
+    """Both 0 where nothing counts."""
+    samples: int
+    seconds: float
+    """Processor time of removal and reading, the commands' other stages left out."""
+    lowest_per_s: float
+    """Cells a second that ``np.minimum`` takes on the same field."""
+    cell_mm: float
+
+
+def cells_of(part: str) -> Cells:
+    """Cut a part with the built-in cell in this process and return what its removal does."""
+    import numpy as np
+
+    from gcode2krl.cutting import engagement, height_field, milling
+
+    grids, seconds, samples = [], [], []
+    new_grid, cut_strip = height_field.HeightField.grid, engagement.cut_strip
+
+    def kept_grid(*given):
+        grids.append(new_grid(*given))
+        return grids[-1]
 
     def timed_strip(*given):
         start = time.process_time()
         cut_strip(*given)
         seconds.append(time.process_time() - start)
 
-    engagement.cut_strip = timed_strip
+    height_field.HeightField.grid, engagement.cut_strip = kept_grid, timed_strip
     cell = gcode2krl.load_cell()
     toolpath = gcode2krl.read_gcode(part, cell)
     motion = gcode2krl.plan_motion(gcode2krl.set_targets(toolpath, cell), cell)
     removal = milling.remove(toolpath, motion, cell)
-    return sum(seconds), float(removal.material.cell_mm[0])
+    samples.append(len(motion))
+    height = np.ascontiguousarray(removal.material.height_mm)
+    lower, best_s = height - 1.0, math.inf
+    for _ in range(5):
+        start = time.process_time()
+        np.minimum(height, lower, out=lower)
+        best_s = min(best_s, time.process_time() - start)
+    looked_at, lowered = (int(sum(grid.counted[k] for grid in grids)) for k in (0, 1))
+    lowest_per_s = height.size / max(best_s, 1e-6)
+    return Cells(looked_at, lowered, sum(samples), sum(seconds), lowest_per_s, removal.material.cell_mm[0])
 
 
-def freecad_line(part: Path, name: str, folder: Path) -> str:
+def print_cells(part: Path, name: str, folder: Path) -> Cells | None:
+    """Print and return what a part's removal does: counted by the checked build, timed with the usual."""
+    command = [sys.executable, str(Path(__file__).resolve()), "--cells-of", str(part)]
+    usual, whole = run(command, folder), run(translate(part, str(folder / "cells.src")), folder)
+    counting = run(command, folder, {"GCODE2KRL_CORE": "checked"})
+    if problem := usual.problem or whole.problem:
+        print(f"  {name:<8}{problem}")
+        return None
+    timed = Cells(*json.loads(usual.output))
+    whole_ns, own_ns = (seconds / timed.samples * 1e9 for seconds in (whole.processor_s, timed.seconds))
+    line = f"  {name:<8}{whole_ns:16.0f}{own_ns:14.0f}"
+    if counting.problem:
+        print(f"{line}  not counted: `python native/build.py --checked` makes the build that counts")
+        return timed
+    counted = Cells(*json.loads(counting.output))
+    per_s = counted.lowered / timed.seconds
+    looked_at = counted.looked_at / max(counted.lowered, 1)
+    print(f"{line}{looked_at:12.2f}{per_s / 1e6:14.1f}{per_s / timed.lowest_per_s:14.2%}")
+    return timed
+
+
+def freecad_line(part: Path, name: str, ours: Cells, folder: Path) -> str:
     """Return the sentence on FreeCAD's simulator with our size of cells; its Python is the system's."""
     if shutil.which("freecadcmd") is None:
         return "FreeCAD's simulator: not found (Debian packages freecad, freecad-python3)"
-    ours = run([sys.executable, str(Path(__file__).resolve()), "--cutting-of", str(part)], folder)
-    if ours.problem:
-        return f"{name}: {ours.problem}"
-    own_s, cell_mm = json.loads(ours.output)
     cutter = {"ball": ["8", "ball"], "flat": ["16", "flat"]}[name]
     script = str(HERE / "peers" / "time_freecad.py")
-    once = run(["/usr/bin/python3", script, str(part), *cutter, str(cell_mm)], folder)
+    once = run(["/usr/bin/python3", script, str(part), *cutter, str(ours.cell_mm)], folder)
     if once.problem:
         return f"FreeCAD's simulator: {once.problem}"
     seconds, moves = (float(word) for word in once.output.split()[-2:])
-    its_us, own_us = seconds / moves * 1e6, own_s / moves * 1e6
+    its_us, own_us = seconds / moves * 1e6, ours.seconds / moves * 1e6
     return (
-        f"{name}, cells of {cell_mm:.3g} mm: FreeCAD's simulator {its_us:.1f} us a move, removal only; "
+        f"{name}, cells of {ours.cell_mm:.3g} mm: FreeCAD's simulator {its_us:.1f} us a move, removal only; "
         f"ours with forces {own_us:.1f} us, {its_us / own_us:.1f} x as fast"
     )
 
@@ -508,11 +523,22 @@ def compare(arguments: argparse.Namespace, folder: Path) -> None:
     print(f"whole processes on {os.cpu_count()} processors; ratios of the best")
     print_table(table)
     words += missing
-    if "freecad" in arguments.peers:
-        few = min(arguments.lines, CELL_LINES)
-        rasters = (("ball", make_raster(folder, few)), ("flat", make_flat_raster(folder, few)))
-        words += dict.fromkeys(freecad_line(small, name, folder) for name, small in rasters)
+    if not HAS_MOTION:
+        words.append("time law and joints along it: not in this version, row skipped")
     for word in words:
+        print(f"  {word}")
+    print_stages(part, lines, folder)
+    few = min(arguments.lines, CELL_LINES)
+    print(f"\n{few:,} lines: ns of processor time a sample, all of the command and its cutting alone;")
+    print("cells looked at for each lowered; cells lowered a second, and as a share of np.minimum's")
+    print(f"  {'':<8}{'command, ns':>16}{'cutting, ns':>14}{'looked at':>12}{'millions/s':>14}{'share':>14}")
+    words = []
+    for name, make in (("ball", make_raster), ("flat", make_flat_raster)):
+        small = make(folder, few)
+        ours = print_cells(small, name, folder)
+        if ours is not None and "freecad" in arguments.peers:
+            words.append(freecad_line(small, name, ours, folder))
+    for word in dict.fromkeys(words):
         print(f"  {word}")
 
 
@@ -613,14 +639,18 @@ def options() -> argparse.Namespace:
     parser.add_argument("--scaling", type=int, nargs="?", const=1_000_000, metavar="LARGEST")
     parser.add_argument("--parts", type=part_counts, default=[], help="2,8: so many parts at once")
     parser.add_argument("--kinds", action="store_true", help="also arcs, a macro program, five axes")
-    parser.add_argument("--cutting-of", help=argparse.SUPPRESS)
+    parser.add_argument("--stages-of", help=argparse.SUPPRESS)
+    parser.add_argument("--cells-of", help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
 def main() -> None:
     arguments = options()
-    if arguments.cutting_of:
-        print(json.dumps(cutting_of(arguments.cutting_of)))
+    if arguments.stages_of:
+        run_stages(arguments.stages_of, Path.cwd())
+        return
+    if arguments.cells_of:
+        print(json.dumps(cells_of(arguments.cells_of)))
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

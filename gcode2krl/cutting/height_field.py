@@ -14,7 +14,7 @@ from gcode2krl.compiled.core import core_function
 from gcode2krl.cutting.sweep import BLOCK, GRID, LANES, Grid
 
 CELLS_PER_DIAMETER = 100.0
-"""Default resolution: 0.16 mm for a cutter of 16 mm. docs/cutting.md says what it costs."""
+"""Default resolution: 0.16 mm for a cutter of 16 mm. `benchmarks/force_accuracy.py` prints what it costs."""
 MAX_CELLS = 16_000_000
 """Default limit of a field: 128 MB, and as much again while it is cut."""
 MESH_CELLS = 250_000

@@ -67,8 +67,6 @@ def test_the_tip_shifts_by_what_forward_kinematics_says(cell):
     np.testing.assert_allclose(tip_shift_mm(moved, q, cell, 1), exact, atol=1e-9)
 
 
-
-
 def check(report):
     assert report.violations == []
     assert 0.99 < report.largest_step <= 1.0 + faults.ROUNDING  # the limit is reached, or nothing is tested
