@@ -9,8 +9,8 @@ from gcode2krl import Prediction, load_cell
 from gcode2krl.gap.answer.causes import issues_of
 from gcode2krl.gap.compare.slips import without_cuts
 from gcode2krl.runs.scan import read_scan
-from tests.gap.test_air import _pair
-from tests.gap.test_instruments import SIGMA, judgement, rough
+from tests.gap.test_dependences import SIGMA_N, of_force, rough
+from tests.gap.test_slips import in_air
 from tests.online.test_replay import HEAD as REPLAYED
 from tests.online.test_replay import write_run
 from tests.remedies.bench import PREDICT, call, case, laid
@@ -43,12 +43,12 @@ def instruments(what):
     loud = rough(5, 2000)
     loud[900:912] *= 12.0
     found = {
-        "loud": lambda: judgement(8.0 * rough(1), 8.0 * rough(2), declared_sigma=1.0),
-        "stated": lambda: judgement(rough(1), rough(2), declared_sigma=SIGMA),
-        "steps": lambda: judgement(10.0 * np.round(rough(1) / 10.0), 10.0 * np.round(rough(2) / 10.0)),
-        "fine": lambda: judgement(rough(1), rough(2)),
-        "rough": lambda: judgement(rough(6, 2000), loud),
-        "even": lambda: judgement(rough(6, 2000), rough(5, 2000)),
+        "loud": lambda: of_force(8.0 * rough(1), 8.0 * rough(2), declared_sigma=1.0),
+        "stated": lambda: of_force(rough(1), rough(2), declared_sigma=SIGMA_N),
+        "steps": lambda: of_force(10.0 * np.round(rough(1) / 10.0), 10.0 * np.round(rough(2) / 10.0)),
+        "fine": lambda: of_force(rough(1), rough(2)),
+        "rough": lambda: of_force(rough(6, 2000), loud),
+        "even": lambda: of_force(rough(6, 2000), rough(5, 2000)),
     }[what]()
     return issues_of([found])
 
@@ -67,7 +67,7 @@ def recorded(*how):
 @call
 def air(*stated):
     """Judge a run in air beside a prediction with forces."""
-    return without_cuts([_pair(False, {"yes": True, "no": False}[stated[0]] if stated else None)])[1]
+    return without_cuts([in_air(False, {"yes": True, "no": False}[stated[0]] if stated else None)])[1]
 
 
 @call
