@@ -83,12 +83,17 @@ class AccelerationLimit:
         if not n:
             return
         block = motion.position_mm, motion.tool, line
-        seam = [np.concatenate([a, b[: 2 * n]]) for a, b in zip(self._before, block, strict=True)]
+        position, tool, lines = self._before
+        seam = (
+            np.concatenate([position, motion.position_mm[: 2 * n]]),
+            np.concatenate([tool, motion.tool[: 2 * n]]),
+            np.concatenate([lines, line[: 2 * n]]),
+        )
         for position, tool, lines in (seam, block):
             if len(tool) > 2 * n:
                 self._largest.take(_bends(position, tool, n, self._dt_s), lines[n:-n], tool[n:-n])
-        last = block if len(line) >= 2 * n else seam
-        self._before = last[0][-2 * n :].copy(), last[1][-2 * n :].copy(), last[2][-2 * n :].copy()
+        position, tool, lines = block if len(line) >= 2 * n else seam
+        self._before = position[-2 * n :].copy(), tool[-2 * n :].copy(), lines[-2 * n :].copy()
 
     def issues(self) -> Iterator[Issue]:
         """Yield a warning where no robot follows."""
