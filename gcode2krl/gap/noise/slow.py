@@ -192,7 +192,7 @@ def slow_parts_of(means: BlockMeans, floor: float = 0.0) -> tuple[SlowPart, ...]
     basis = _basis(means.known)
     if len(means.values) < _LIMITS.noise_least_rows or _seen(means, basis) <= _FLOOR_SHARE * floor:
         return ()
-    fit = _Fit(means)
+    fit = _Learnt(means)
     if not any(fit.needs_slow(basis, fit.peak(basis, (part,)), 0.0) for part in _COARSE):
         return ()
     peak = fit.best(basis)
@@ -221,10 +221,10 @@ def _seen(means: BlockMeans, basis: Floats) -> float:
     return rms(unexplained)
 
 
-def _explained(fit: "_Fit", basis: Floats, peak: _Peak) -> tuple[Floats, _Peak]:
+def _explained(fit: "_Learnt", basis: Floats, peak: _Peak) -> tuple[Floats, _Peak]:
     """Return a basis with all that explains more than slow noise would, and the likelihood beside it."""
     for _ in range(_LIMITS.noise_most_explained):
-        trials = [_Trial.of(fit, basis, columns, peak) for columns in fit.promising(basis, peak)]
+        trials = [_Tried.of(fit, basis, columns, peak) for columns in fit.promising(basis, peak)]
         trial = max(trials, key=lambda each: each.surprise, default=None)
         if trial is None or trial.surprise < _LIMITS.noise_explained:
             break
@@ -275,7 +275,7 @@ class _White:
         return cls(columns, gram, float(np.linalg.slogdet(gram[:-1, :-1])[1]))
 
 
-class _Fit:
+class _Learnt:
     """The likelihood of block means, with what was computed of it."""
 
     def __init__(self, means: BlockMeans) -> None:
@@ -438,7 +438,7 @@ class _Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
+class _Tried:
     """A fit beside some more columns, and how surprising its likelihood ratio is."""
 
     peak: _Peak
@@ -447,7 +447,7 @@ class _Trial:
     """-log of the probability of that ratio without them."""
 
     @classmethod
-    def of(cls, fit: _Fit, basis: Floats, columns: Floats, before: _Peak) -> "_Trial":
+    def of(cls, fit: _Learnt, basis: Floats, columns: Floats, before: _Peak) -> "_Tried":
         """Return the fit of columns (n, q) beside a basis."""
         from scipy.special import chdtrc
 
