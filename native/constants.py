@@ -41,7 +41,7 @@ MODULES = {
     "TD": "gcode2krl.cutting.dexels",
     "TU": "gcode2krl.cutting.turned",
     "LAW": "gcode2krl.cutting.law",
-    "PROCESS": "gcode2krl.cutting.process_stiffness",
+    "PROCESS": "gcode2krl.cutting.stiffness",
     "STANDING": "gcode2krl.robot.standing",
     "CHAIN": "gcode2krl.compliance.chain",
     "SCENE": "gcode2krl.collision.scene",

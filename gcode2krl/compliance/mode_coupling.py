@@ -1,7 +1,7 @@
 """Mode coupling: when the force that follows the tip's own displacement makes it swing by itself.
 
 A tip of stiffness K is displaced by u, depth and width of cut change with it, and so does the mean force, by
-Kp·u (the *process stiffness*, `cutting.process_stiffness`). With one mass m for all directions
+Kp·u (the *process stiffness*, `cutting.stiffness`). With one mass m for all directions
 
     m·u'' + C·u' + (K - g·Kp)·u = 0,    C = 2·zeta·sqrt(m)·sqrt(K)
 

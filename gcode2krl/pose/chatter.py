@@ -20,7 +20,7 @@ from gcode2krl.compliance.mode_coupling import MOST_GAIN, coupling_index, tip_fl
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import law_array
 from gcode2krl.cutting.lobes import depth_limit
-from gcode2krl.cutting.process_stiffness import process_stiffness, stiffness_of_cut
+from gcode2krl.cutting.stiffness import process_stiffness, stiffness_of_cut
 from gcode2krl.errors import Issue
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.pose.quality import Poses

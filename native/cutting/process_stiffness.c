@@ -1,4 +1,4 @@
-/* How the mean force changes where the tip is displaced (cutting/process_stiffness.py): a loop over samples. */
+/* How the mean force changes where the tip is displaced (cutting/stiffness.py): a loop over samples. */
 
 #include "cutting/slices.h"
 

@@ -11,7 +11,7 @@ from gcode2krl.compliance.mode_coupling import DAMPING, MOST_GAIN, coupling_inde
 from gcode2krl.cutting.force import cutting_load
 from gcode2krl.cutting.law import KIENZLE, law_array, linear_edge_law
 from gcode2krl.cutting.lobes import depth_limit
-from gcode2krl.cutting.process_stiffness import process_stiffness
+from gcode2krl.cutting.stiffness import process_stiffness
 from gcode2krl.frames import rotation_from_quaternion
 from gcode2krl.pose.chatter import coupling_along
 from gcode2krl.pose.spin import stiffest_spin

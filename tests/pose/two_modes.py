@@ -12,7 +12,7 @@ import numpy as np
 from gcode2krl.compliance.mode_coupling import coupling_index
 from gcode2krl.cutting import mean_force
 from gcode2krl.cutting.law import linear_edge_law
-from gcode2krl.cutting.process_stiffness import process_stiffness
+from gcode2krl.cutting.stiffness import process_stiffness
 
 CASES, SEED = 200, 46
 STEP_S, LONG_S = 2e-3, 6.0
