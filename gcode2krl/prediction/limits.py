@@ -122,13 +122,13 @@ class ForceLimits:
         columns = (forces.force_base_N, forces.moment_base_Nmm, forces.torque_Nmm, forces.peak_N)
         tool = np.ascontiguousarray(forces.tool)
         tools = distinct(tool)
-        found, rows = np.empty(5), np.empty(3, dtype=np.int64)
+        loads, rows = np.empty(5), np.empty(3, dtype=np.int64)
         weight_N = self._weight_N(tools)
-        wrong = _find_loads(*map(contiguous, columns), tool, tools, weight_N, ABSURD_FORCE_N, found, rows)
+        wrong = _find_loads(*map(contiguous, columns), tool, tools, weight_N, ABSURD_FORCE_N, loads, rows)
         if wrong >= 0:
             self.absurd = _absurd_forces(int(tool[wrong]), int(line[wrong]))
             return
-        *values, cut_N, whole_N = found.tolist()
+        *values, cut_N, whole_N = loads.tolist()
         kinds = (self.force, self.torque, self.load)
         for kind, value, row in zip(kinds, values, rows.tolist(), strict=True):
             is_new = kind.raise_to(value, int(line[row]), int(tool[row]))

@@ -83,8 +83,8 @@ def cause_of(cause: Cause, judgement: Judged, link: str, pairs: Sequence[Pair] =
         constant=cause.constant,
         indistinguishable_from=(
             *[
-                EffectAt(*each.key, rival.behind_nats, together=bool(rival.beside) or None)
-                for rival in sorted(alike, key=lambda each: not each.beside)
+                EffectAt(*each.key, rival.behind_nats, together=bool(rival.companions) or None)
+                for rival in sorted(alike, key=lambda each: not each.companions)
                 for each in rival.together
             ][: THRESHOLDS.answer.most_alike],
             *_unknown(cause),

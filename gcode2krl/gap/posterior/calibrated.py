@@ -116,8 +116,8 @@ def family_features(
     """
     study = unnamed.study
     rivals = [each for each in study.evidences if each.place.component == evidence.place.component]
-    told = {each.told for each in (evidence, *alike)}
-    other = max((each.nats for each in rivals if each.told not in told), default=0.0)
+    in_set = {each.told for each in (evidence, *alike)}
+    other = max((each.nats for each in rivals if each.told not in in_set), default=0.0)
     return FamilyFeatures(
         lead_nats=_within((evidence.nats - max(other, 0.0)) / _scatter(rivals[0])),
         share=unnamed.share(evidence),

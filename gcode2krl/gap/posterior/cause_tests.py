@@ -554,8 +554,8 @@ class LinkFamilies:
             least_form = 1.0 - _LIMITS.model_error**2
             is_nearly = form >= (1.0 - _LIMITS.small_errors) * (form + own_rest)
             if applied.effect.of_set_up == "frame" and is_nearly:  # seldom the only small error of a set-up
-                left = self._beside_small_errors.evidences
-                own_rest = max((net_gain(each) for each in left if _is_of(applied, each)), default=0.0)
+                evidences = self._beside_small_errors.evidences
+                own_rest = max((net_gain(each) for each in evidences if _is_of(applied, each)), default=0.0)
         return FamilyTests(
             margin=float(margin),
             form_ratio=form / max(form + own_rest, 1e-30),

@@ -434,11 +434,11 @@ def _without_causes(examination: Examination, every: tuple[Trace, ...]) -> Judge
     size = _size(examination, every, ())
     # families say nothing of a model that is met to its own accuracy: what it leaves is no noise
     is_asked = size.significant or examination.link.model_rms == 0.0
-    rest = LinkFamilies(examination, every).rest if is_asked else NOTHING_LEFT
-    rest = replace(rest, is_sized=size.significant)
-    is_gap = _is_gap(examination, size, rest) and not is_wander(examination, every, rest)
+    unnamed = LinkFamilies(examination, every).rest if is_asked else NOTHING_LEFT
+    unnamed = replace(unnamed, is_sized=size.significant)
+    is_gap = _is_gap(examination, size, unnamed) and not is_wander(examination, every, unnamed)
     verdict = "unexplained" if is_gap else "no_gap"
-    return replace(_of(examination, verdict, (), size, rest, held_out=True), every=every)
+    return replace(_of(examination, verdict, (), size, unnamed, held_out=True), every=every)
 
 
 def _of(
@@ -446,7 +446,7 @@ def _of(
     verdict: str,
     causes: tuple[Cause, ...],
     size: Size,
-    rest: Rest,
+    unnamed: Rest,
     *,
     held_out: bool,
 ) -> Judgement:
@@ -460,7 +460,7 @@ def _of(
         traces=examination.traces,
         examination=examination,
         usual=examination.mismatch,
-        rest=rest,
+        rest=unnamed,
     )
 
 
@@ -542,15 +542,15 @@ def _judgement(
     causes = sorted(all_causes, key=lambda cause: -cause.probability)
     named = [examination.applied.index(cause.applied) for cause in causes if cause.probability >= NAMED]
     is_sized = is_significant if named else sizes[0].significant
-    rest = replace(families.beside(named), is_sized=is_sized)
+    unnamed = replace(families.beside(named), is_sized=is_sized)
     is_left = is_significant and last.share_left >= THRESHOLDS.posterior.other_share
     # loud rows that the causes tell on data not used are no bursts of an instrument
     is_foretold = bool(trials) and sizes[0].is_loud and last.share_left <= _LIMITS.named_left
-    is_gap = _is_gap(examination, sizes[0], rest) or is_foretold
+    is_gap = _is_gap(examination, sizes[0], unnamed) or is_foretold
     if not named and is_gap:
-        is_gap = not is_wander(examination, families.traces, rest, families.effects_nats)
-    verdict = _verdict(bool(named), is_left or bool(rest.worth_naming), is_gap)
-    return _of(examination, verdict, tuple(causes), last, rest, held_out=bool(trials))
+        is_gap = not is_wander(examination, families.traces, unnamed, families.effects_nats)
+    verdict = _verdict(bool(named), is_left or bool(unnamed.worth_naming), is_gap)
+    return _of(examination, verdict, tuple(causes), last, unnamed, held_out=bool(trials))
 
 
 def _leave_much(
@@ -600,8 +600,8 @@ def _unexplained_at(trace: Trace, judged: Judgement) -> Floats | None:
 
 def share_told(columns: Floats, signal: Floats) -> float:
     """Return the share of a signal's power (n, k) that sums of some columns (n, c) take."""
-    told = columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
-    return float(np.sum(told**2) / max(np.sum(signal**2), 1e-300))
+    fitted = columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
+    return float(np.sum(fitted**2) / max(np.sum(signal**2), 1e-300))
 
 
 def _unnamed(cause: Cause) -> Cause:
@@ -673,12 +673,10 @@ def _held_out(
     if not trials:
         return HeldOut(None, None, None, None, share_left)
     before, after = sizes[order].shrink, sizes[order + 1].shrink
-    if examination.is_of_set(
-        number
-    ):  # what several do together none of them does beside the first ones alone
-        others = [each for each in examination.cause_numbers if each != number]
-        left = [trial.size_with([examination.applied[each] for each in others]) for trial in trials]
-        before, after = pooled(left).shrink, sizes[-1].shrink
+    if examination.is_of_set(number):  # what several do together none does beside the first ones alone
+        others = [examination.applied[cause] for cause in examination.cause_numbers if cause != number]
+        without = [trial.size_with(others) for trial in trials]
+        before, after = pooled(without).shrink, sizes[-1].shrink
     gone = max(0.0, after - before)
     applied = examination.applied[number]
     folds = [trial for trial in trials if trial.is_fold]

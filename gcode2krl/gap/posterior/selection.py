@@ -733,13 +733,13 @@ class Rival:
     chi2_difference: float
     distance2: float = np.inf
     """Square of the distance between both refitted signals, over the power of what the cause does."""
-    beside: tuple[Applied, ...] = ()
+    companions: tuple[Applied, ...] = ()
     """Others without which it does not do what the cause does."""
 
     @property
     def together(self) -> tuple[Applied, ...]:
         """Return all effects that stand in place of the cause."""
-        return self.applied, *self.beside
+        return self.applied, *self.companions
 
     @property
     def is_better(self) -> bool:
@@ -802,19 +802,19 @@ def with_set_rival(examination: Examination, number: int, rivals: Sequence[Rival
     spread = sensitivity_of(examination.likelihood, examination.fitted, number).inflation()
     key, taken_out = examination.applied[number].key, examination.errors_of_set_up
     view = examination.data.gram(examination.fitted, taken_out)
-    beside = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
+    with_it = _Sets(view, columns, spread).best(frozenset({key} & columns.keys()))
     if number not in taken_out:
         view = examination.data.gram(examination.fitted, {*taken_out, number})
     others = {each: column for each, column in columns.items() if each != key}
     instead = _Sets(view, others, spread).best()
     applied = [
-        each for each in instead.applied(columns, examination.traces[0]) if each.key not in beside.keys
+        each for each in instead.applied(columns, examination.traces[0]) if each.key not in with_it.keys
     ]
     alike = {rival.applied.key for rival in rivals if rival.alike}
     if not applied or not alike.isdisjoint(each.key for each in applied):
         return [*rivals]
-    chi2 = (instead.chi2 - beside.chi2) / spread
-    together = Rival(applied[0], chi2 + instead.cost - beside.cost, chi2, beside=tuple(applied[1:]))
+    chi2 = (instead.chi2 - with_it.chi2) / spread
+    together = Rival(applied[0], chi2 + instead.cost - with_it.cost, chi2, companions=tuple(applied[1:]))
     return sorted([*rivals, together] if together.alike else rivals, key=lambda each: each.cost_difference)
 
 
