@@ -250,7 +250,9 @@ def _failed(copy: Path, tests: list[str], slow: bool) -> str | None:
     }
     (copy / "asked.txt").write_text("\n".join(tests), encoding="utf-8")  # too many for a command line
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "@asked.txt"]
-    command += ["-m", "slow or not slow"] if slow else ["--timeout", str(HANGS_S)]
+    command += (
+        ["-m", "slow or not slow"] if slow else ["--timeout", str(HANGS_S), "--timeout-method", "thread"]
+    )
     done = subprocess.run(
         command, cwd=copy, env=environment, capture_output=True, text=True, timeout=LONGEST_S
     )
