@@ -24,7 +24,7 @@ def _rival(*texts, alike):
     together = applied(*texts)
     return SimpleNamespace(
         applied=together[0],
-        beside=together[1:],
+        companions=together[1:],
         together=together,
         alike=alike,
         behind_nats=1.0 if alike else 20.0,
