@@ -472,12 +472,12 @@ class PosteriorThresholds:
 
     # Numbers of effects
     prior_sizes: float = convention(3.0, "the standard deviation of a size's prior, in typical sizes")
-    shape_span: float = convention(
-        0.8, "of its range: a shape whose 90 % interval is wider was not found, and is not stated"
-    )
     set_up_sizes: tuple[float, ...] = convention(
         (3.0, 1.0, 0.3),
-        "the same of the errors of a set-up, of which the data tell how large they are all together",
+        "the same of all errors of a set-up together, in typical sizes: the one with most evidence is taken",
+    )
+    shape_span: float = convention(
+        0.8, "of its range: a shape whose 90 % interval is wider was not found, and is not stated"
     )
     number_cost: float = convention(
         0.5, "of two effects that are one to the data the one with fewer numbers is named; as chi2"
